@@ -34,7 +34,13 @@ of numbers."""
 
 
 def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:
-    """Return the entries of a given value: one entry for a line, two entries for a plane."""
+    """Return the entries of a given value: one entry for a line, two entries for a plane.
+
+    Return the entries of a given value: one entry for a line, two entries for a plane.
+
+    >>> _one_or_two(3, _length), _one_or_two(np.array([3, 4.5]), float), _one_or_two([8, 1e2], int)
+    (3.0, (3.0, 4.5), (8, 100))
+    """
     value = in_si(value, "length")
     if isinstance(value, np.ndarray):
         value = value.tolist()
@@ -46,18 +52,56 @@ def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:
 
 
 def _length(value: Any) -> float:
+    """Return a positive length, m.
+
+    >>> for value in (2, 0.0, math.inf, -1.0):
+    ...     try:
+    ...         print(_length(value))
+    ...     except ValueError as error:
+    ...         print(error)
+    2.0
+    must be positive and finite
+    must be positive and finite
+    must be positive and finite
+    """
     if not 0.0 < as_number(value) < math.inf:
         raise ValueError("must be positive and finite")
     return as_number(value)
 
 
 def _node_count(value: Any) -> int:
+    """Return an even node count.
+
+    >>> for value in (8, 9, 6, 1e2):
+    ...     try:
+    ...         print(_node_count(value))
+    ...     except ValueError as error:
+    ...         print(error)
+    8
+    must be even and at least 8
+    must be even and at least 8
+    100
+    """
     if as_count(value) < FEWEST_NODES or as_count(value) % 2:
         raise ValueError(f"must be even and at least {FEWEST_NODES}")
     return as_count(value)
 
 
 def _two_places(value: Any) -> tuple[float, float]:
+    """Return two lengths, m.
+
+    >>> _two_places([0, np.float32(1.5)]), _two_places((-3, 0))
+    ((0.0, 1.5), (-3.0, 0.0))
+    >>> for value in ([1, 2, 3], "ab", (1, math.inf), 4):
+    ...     try:
+    ...         _two_places(value)
+    ...     except ValueError as error:
+    ...         print(error)
+    must be two lengths
+    must be two lengths
+    must be finite
+    must be two lengths
+    """
     value = in_si(value, "length")
     if isinstance(value, str) or np.shape(np.asarray(value, dtype=object)) != (2,):
         raise ValueError("must be two lengths")
@@ -100,7 +144,26 @@ class Ellipse(Listed):
 
 
 def _extent(value: Any, info: ValidationInfo) -> Any:
-    """Read an extent: two ends of a line, two pairs or an `Ellipse` on a plane, or a mask."""
+    """Read an extent: two ends of a line, two pairs or an `Ellipse` on a plane, or a mask.
+
+    >>> from types import SimpleNamespace
+    >>> info = SimpleNamespace(context=None)
+    >>> _extent([1, 2], info), _extent([[1, 2], [3, 4]], info), _extent(None, info)
+    ((1.0, 2.0), ((1.0, 2.0), (3.0, 4.0)), None)
+    >>> _extent({"centre": [1, 2], "semi_axes": [3, 4]}, info).semi_axes
+    (3.0, 4.0)
+    >>> mask = _extent([False, True, True], info)
+    >>> mask.tolist(), mask.flags.writeable
+    ([False, True, True], False)
+    >>> profile = SimpleNamespace(to_xarray=lambda: np.array([0.0, 2.0, -1.0]))
+    >>> info = SimpleNamespace(context={"read": lambda path, quantity: profile})
+    >>> _extent("mask.npy", info).tolist()
+    [False, True, True]
+    >>> _extent([1.0, 0.0, 1.0], info)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    ValueError: must be two ends, two pairs of ends, an Ellipse or a mask ...
+    """
     read = (info.context or {}).get("read")
     if isinstance(value, str) and read is not None:
         value = np.asarray(read(value, "slip").to_xarray()) != 0.0  # a mask in a file
@@ -125,6 +188,11 @@ def _extent(value: Any, info: ValidationInfo) -> Any:
 
 
 def _plain_extent(value: Any) -> Any:
+    """Return an extent in plain form for a study file.
+
+    >>> _plain_extent(np.array([True, False])), _plain_extent((1.0, 2.0))
+    ([True, False], [1.0, 2.0])
+    """
     return value.tolist() if isinstance(value, np.ndarray) else to_plain(value)
 
 
@@ -219,7 +287,28 @@ class Interface(Listed):
         return self
 
     def _wrong_extent(self) -> str | None:
-        """Return a message if the extent is invalid, or None."""
+        """Return a message if the extent is invalid, or None.
+
+        The extent may begin and end with the interface:
+
+        >>> valid = (0.0, 8.0), (2.0, 3.0)
+        >>> for extent in (*valid, (2.0, 2.5), (-1.0, 3.0), (3.0, 2.0), (5.0, 8.1)):
+        ...     try:
+        ...         print(int(Interface(8.0, 8, extent=extent).breakable.sum()))
+        ...     except InputError as error:
+        ...         print(str(error)[11:61])
+        8
+        2
+        extent: contains 1, but must contain at least two.
+        extent: must be increasing and lie within 0 to 8 m
+        extent: must be increasing and lie within 0 to 8 m
+        extent: must be increasing and lie within 0 to 8 m
+        >>> sides = (2.0, 3.0), (4.0, 17.0)
+        >>> Interface((8.0, 16.0), (8, 8), extent=sides)  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ...
+        stiction.base.errors.InputError: Interface: ... within 0 to 16 m along y, got 4 to 17 m
+        """
         extent, ends = self.extent, self._ends
         if extent is None:
             return None
@@ -246,6 +335,13 @@ class Interface(Listed):
         """Ends of the extent along each direction, m.
 
         None if there is no extent, or for a mask.
+
+        >>> Interface(8.0, 8, extent=(2.0, 5.0))._ends, Interface(8.0, 8)._ends
+        (((2.0, 5.0),), None)
+        >>> ellipse = Ellipse(centre=(4.0, 8.0), semi_axes=(3.0, 2.0))
+        >>> Interface((8.0, 16.0), (8, 8), extent=ellipse)._ends
+        ((1.0, 7.0), (6.0, 10.0))
+        >>> Interface(8.0, 8, extent=[True, True, *[False] * 6])._ends
         """
         extent = self.extent
         if isinstance(extent, Ellipse):
@@ -257,7 +353,27 @@ class Interface(Listed):
 
     @property
     def _inside(self) -> Mask:
-        """Mask of the nodes in the extent, also on its border, with shape (*shape)."""
+        """Mask of the nodes in the extent, also on its border, with shape (*shape).
+
+        The end of a periodic interface is its first node. Nodes of a specimen
+        lie in the middle of cells:
+
+        >>> for ends in (None, "free"):
+        ...     print(np.flatnonzero(Interface(8.0, 8, extent=(5.0, 8.0), ends=ends)._inside))
+        [0 5 6 7]
+        [5 6 7]
+
+        Nodes are 1 m and 2 m apart. Points of a lattice lie within and on a
+        circle with the radius 2:
+
+        >>> ellipse = Ellipse(centre=(4.0, 8.0), semi_axes=(2.0, 4.0))
+        >>> inside = Interface((8.0, 16.0), (8, 8), extent=ellipse)._inside
+        >>> int(inside.sum()), np.argwhere(inside)[:4].tolist()
+        (13, [[2, 4], [3, 3], [3, 4], [3, 5]])
+        >>> sides = (2.0, 3.0), (4.0, 8.0)
+        >>> np.argwhere(Interface((8.0, 16.0), (8, 8), extent=sides)._inside)[:4].tolist()
+        [[2, 2], [2, 3], [2, 4], [3, 2]]
+        """
         extent, grid = self.extent, np.meshgrid(*self.coordinates.values(), indexing="ij")
         if isinstance(extent, np.ndarray):
             return extent
@@ -288,13 +404,28 @@ class Interface(Listed):
         return self.extent is not None and not self.breakable.all()
 
     def mean(self, profiles: Array) -> Array:
-        """Return means of profiles (..., *shape) over the nodes that can break."""
+        """Return means of profiles (..., *shape) over the nodes that can break.
+
+        >>> profiles = np.arange(16.0).reshape(2, 8)
+        >>> for extent in (None, (2.0, 4.0), (0.0, 7.0)):
+        ...     print(Interface(8.0, 8, extent=extent).mean(profiles).tolist())
+        [3.5, 11.5]
+        [3.0, 11.0]
+        [3.5, 11.5]
+        """
         held = self.is_held
         return profiles[..., self.breakable].mean(-1) if held else profiles.mean(self.axes)
 
     @property
     def breakable_measure(self) -> float:
-        """Length (m), or area on a plane (m²), of the nodes that can break."""
+        """Length (m), or area on a plane (m²), of the nodes that can break.
+
+        >>> sides = (2.0, 4.0), (4.0, 12.0)  # 3 x 5 nodes
+        >>> for extent in (sides, None):
+        ...     print(float(Interface((8.0, 16.0), (8, 8), extent=extent).breakable_measure))
+        30.0
+        128.0
+        """
         return np.count_nonzero(self.breakable) * self.cell if self.is_held else self.measure
 
     @property
@@ -302,6 +433,14 @@ class Interface(Listed):
         """Longest side of the part that can break, m.
 
         For the whole interface it is a period.
+
+        >>> sides = (2.0, 4.0), (4.0, 12.0)  # 3 m and 10 m
+        >>> for extent in (sides, None):
+        ...     print(float(Interface((8.0, 16.0), (8, 8), extent=extent).reach))
+        10.0
+        16.0
+        >>> [Interface(8.0, 8, extent=extent).is_held for extent in ((2.0, 4.0), (0.0, 7.0))]
+        [True, False]
         """
         if not self.is_held:
             return max(self.lengths)
@@ -323,7 +462,12 @@ class Interface(Listed):
 
     @property
     def embedding(self) -> Interface:
-        """Periodic interface for random fields, twice as long if the ends are free."""
+        """Periodic interface for random fields, twice as long if the ends are free.
+
+        >>> free = Interface(8.0, 16, ends="free").embedding
+        >>> free.length, free.nodes, free.ends, Interface(8.0, 16).embedding.length
+        (16.0, 32, None, 8.0)
+        """
         if not self.is_free:
             return self
         return Interface(2.0 * self.measure, 2 * self.size)
@@ -365,7 +509,17 @@ class Interface(Listed):
 
     @property
     def cell(self) -> float:
-        """Length (m), or area on a plane (m²), that a node represents."""
+        """Length (m), or area on a plane (m²), that a node represents.
+
+        >>> plane = Interface((8.0, 48.0), (8, 16))
+        >>> plane.size, plane.measure, plane.cell, plane.spacings, plane.spacing
+        (128, 384.0, 3.0, (1.0, 3.0), 3.0)
+        >>> plane.lengths, plane.shape, plane.dims, plane.axes, plane.is_plane
+        ((8.0, 48.0), (8, 16), ('x', 'y'), (-2, -1), True)
+        >>> line = Interface(8.0, 16)
+        >>> line.lengths, line.shape, line.dims, line.axes, line.is_plane, line.size, line.cell
+        ((8.0,), (16,), ('x',), (-1,), False, 16, 0.5)
+        """
         return self.measure / self.size
 
     @cached_property
@@ -380,7 +534,14 @@ class Interface(Listed):
 
     @property
     def coordinates(self) -> dict[str, Array]:
-        """Positions of the nodes along each direction, in [0, length), m."""
+        """Positions of the nodes along each direction, in [0, length), m.
+
+        >>> plane = Interface((8.0, 48.0), (8, 16))
+        >>> {dim: places[:3].tolist() for dim, places in plane.coordinates.items()}
+        {'x': [0.0, 1.0, 2.0], 'y': [0.0, 3.0, 6.0]}
+        >>> Interface(8.0, 16, ends="free").x[[0, -1]].tolist()
+        [0.25, 7.75]
+        """
         directions = zip(self.dims, self.shape, self.spacings, strict=True)
         return {dim: (np.arange(n) + self.first) * spacing for dim, n, spacing in directions}
 
@@ -391,13 +552,23 @@ class Interface(Listed):
 
     @property
     def y(self) -> Array:
-        """Node positions along y on a plane, m, with shape (nodes,)."""
+        """Node positions along y on a plane, m, with shape (nodes,).
+
+        >>> Interface((8.0, 48.0), (8, 16)).y[:3].tolist()
+        [0.0, 3.0, 6.0]
+        """
         if not self.is_plane:
             raise InputError("y: the interface is a line along x. Only a plane has y")
         return self.coordinates["y"]
 
     def describe_node(self, node: int) -> str:
-        """Describe in words where a node of the flattened profile lies."""
+        """Describe in words where a node of the flattened profile lies.
+
+        >>> Interface((8.0, 48.0), (8, 16)).describe_node(35)
+        'x = 2 m, y = 9 m'
+        >>> Interface(8.0, 16, ends="free").describe_node(1)
+        'x = 0.75 m'
+        """
         entry = np.unravel_index(int(node), self.shape)
         places = zip(self.dims, entry, self.spacings, strict=True)
         return ", ".join(
@@ -410,6 +581,12 @@ class Interface(Listed):
 
         The components broadcast to the shape of a transformed profile: (n//2 + 1,) on a
         line, (nx, 1) and (1, ny//2 + 1) on a plane.
+
+        >>> Interface(2.0 * np.pi, 8).wave_vectors[0].round(9).tolist()
+        [0.0, 1.0, 2.0, 3.0, 4.0]
+        >>> kx, ky = Interface((2.0 * np.pi, 4.0 * np.pi), (8, 10)).wave_vectors
+        >>> kx.shape, kx.ravel().round(9).tolist(), ky.round(9).tolist()
+        ((8, 1), [0.0, 1.0, 2.0, 3.0, -4.0, -3.0, -2.0, -1.0], [[0.0, 0.5, 1.0, 1.5, 2.0, 2.5]])
         """
         *first, last = (2.0 * np.pi / length for length in self.lengths)
         along = last * np.arange(self.shape[-1] // 2 + 1)
@@ -420,7 +597,14 @@ class Interface(Listed):
 
     @property
     def wavenumbers(self) -> Array:
-        """Absolute values of the wave vectors, rad/m, with shape (n//2 + 1,) or (nx, ny//2 + 1)."""
+        """Absolute values of the wave vectors, rad/m, with shape (n//2 + 1,) or (nx, ny//2 + 1).
+
+        >>> k = Interface((2.0 * np.pi, 4.0 * np.pi), (8, 10)).wavenumbers
+        >>> k.shape, round(float(k[5, 1]) ** 2, 9)
+        ((8, 6), 9.25)
+        >>> Interface(np.pi, 8).wavenumbers.round(9).tolist()
+        [0.0, 2.0, 4.0, 6.0, 8.0]
+        """
         vectors = self.wave_vectors
         return vectors[0] if len(vectors) == 1 else np.hypot(*vectors)
 
@@ -430,6 +614,12 @@ class Interface(Listed):
 
         The constant mode counts as mode II. On a line the fraction is 1,
         because the problem sets the mode.
+
+        >>> share = Interface((2.0 * np.pi, 4.0 * np.pi), (8, 10)).in_plane_share
+        >>> share[[0, 0, 2, 1], [0, 1, 0, 4]].round(9).tolist()  # 4: ky = 2
+        [1.0, 0.0, 1.0, 0.2]
+        >>> Interface(2.0, 8).in_plane_share.tolist()
+        [1.0, 1.0, 1.0, 1.0, 1.0]
         """
         k = self.wavenumbers
         k.flat[0] = 1.0
@@ -442,11 +632,27 @@ class Interface(Listed):
 
         Profiles are transformed one at a time, so the result does not
         depend on the batch.
+
+        >>> plane = Interface((8.0, 16.0), (8, 10))
+        >>> wave = np.cos(2.0 * np.pi * (2.0 * plane.x[:, None] / 8.0 + plane.y / 16.0))
+        >>> spectrum = plane.transform(np.stack([wave, 0.0 * wave]))
+        >>> spectrum.shape, np.argwhere(np.abs(spectrum) > 1e-9).tolist()
+        ((2, 8, 6), [[0, 2, 1]])
+        >>> round(float(spectrum[0, 2, 1].real), 9)
+        40.0
         """
         return np.fft.rfft2(profiles) if self.is_plane else np.fft.rfft(profiles)
 
     def inverse_transform(self, spectra: Array) -> Array:
-        """Return profiles (..., *shape) from their real Fourier transforms."""
+        """Return profiles (..., *shape) from their real Fourier transforms.
+
+        >>> for interface in (Interface(8.0, 10), Interface((8.0, 16.0), (8, 10))):
+        ...     rows = np.arange(2.0 * interface.size).reshape(2, *interface.shape)
+        ...     back = interface.inverse_transform(interface.transform(rows))
+        ...     print(back.shape, float(np.abs(back - rows).max()) < 1e-9)
+        (2, 10) True
+        (2, 8, 10) True
+        """
         if self.is_plane:
             return np.fft.irfft2(spectra, self.shape)
         return np.fft.irfft(spectra, self.shape[0])

@@ -172,7 +172,27 @@ class Problem(Listed):
         return self
 
     def _of_specimen(self) -> list[str]:
-        """Let the interface end with the specimen, and return messages about unsuitable inputs."""
+        """Let the interface end with the specimen, and return messages about unsuitable inputs.
+
+        >>> from stiction.problem.friction import LinearWeakening
+        >>> solid, law = Solid(1e9, 0.2, 1200.0), LinearWeakening(critical_slip=1.0)
+        >>> def problems(interface=Interface(8.0, 16), mode="II", load=Load(), **given):
+        ...     part = Blocks(**given) if given else None
+        ...     try:
+        ...         return Problem(solid, interface, law, load, mode, part).interface.ends
+        ...     except InputError as error:
+        ...         return [text[9:42] for text in error.problems]
+        >>> problems(), problems(height=1.0), problems(Interface(8.0, 16, ends="free"))
+        (None, 'free', ['interface.ends: free ends need a '])
+        >>> problems(height=0.99), problems(Interface(50.0, 100), height=1.0)
+        (['specimen.height: must be at least'], ['specimen.height: must be 0.025 to'])
+        >>> problems(Interface(50.0, 100), height=1.25), problems(height=81.0, mode="III")
+        ('free', 'free')
+        >>> problems(height=2.0, load=Load(normal_pressure=[1e6] * 16))
+        'free'
+        >>> problems(height=2.0, pressing="glued", load=Load(normal_pressure=[1e6] * 16))
+        ['load.normal_pressure: must be a m']
+        """
         interface, specimen = self.interface, self.specimen
         pressure: Any = self.load.normal_pressure
         if specimen is None:
@@ -244,7 +264,23 @@ class Problem(Listed):
             doubt_units([Doubt(text, machine / blocks, (MIN_MACHINE_RATIO, math.inf))])
 
     def _place_profiles(self) -> list[str]:
-        """Put profiles that have coordinates on the nodes, and return errors of profiles."""
+        r"""Put profiles that have coordinates on the nodes, and return errors of profiles.
+
+        >>> import xarray as xr
+        >>> from stiction.problem.friction import LinearWeakening
+        >>> reversed_x = xr.DataArray([7.0, *[3.0] * 7], {"x": np.arange(8.0)[::-1]}, ["x"])
+        >>> def placed(**given):
+        ...     solid, law = Solid(1e9, 0.2, 1200.0), LinearWeakening(critical_slip=1.0)
+        ...     try:
+        ...         return Problem(solid, Interface(8.0, 8), law, Load(**given)).load
+        ...     except InputError as error:
+        ...         print(*[text[9:73] for text in error.problems], sep="\n")
+        >>> placed(profile=reversed_x, initial_stress=[1.0] * 8).profile.tolist()
+        [3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 7.0]
+        >>> placed(profile=[1.0] * 7, initial_stress=reversed_x[:4])
+        load.profile: must have the shape (8,) of the nodes, got an arra
+        load.initial_stress: values are missing (NaN) at 4 of 8 nodes, t
+        """
         problems: list[str] = []
         shape = self.interface.shape
         for part in ("friction", "load"):
@@ -282,11 +318,30 @@ class Problem(Listed):
 
     @property
     def has_machine(self) -> bool:
-        """Whether an elastic machine, which loses force by slip, drives the specimen."""
+        """Whether an elastic machine, which loses force by slip, drives the specimen.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.problem.specimen import Platen
+        >>> machines = [Platen(stiffness=value) for value in (0.0, 3e6)]
+        >>> blocks = [Blocks(height=1.0, thickness=0.5, drive=drive) for drive in machines]
+        >>> [Problem.has_machine.fget(SimpleNamespace(specimen=part)) for part in (None, *blocks)]
+        [False, False, True]
+        """
         return self.specimen is not None and self.specimen.drive.stiffness > 0.0
 
     def released_stress(self, slip: Array) -> Array:
-        """Return the stress K d that a slip (*shape), m, takes off the interface, Pa."""
+        """Return the stress K d that a slip (*shape), m, takes off the interface, Pa.
+
+        A slip cos 2x of half-spaces releases (G*/2) 2 cos 2x, and G* = 1.25 GPa:
+
+        >>> from stiction.problem.friction import LinearWeakening
+        >>> line, law = Interface(2.0 * np.pi, 16), LinearWeakening(critical_slip=1.0)
+        >>> problem = Problem(Solid(1e9, 0.2, 1200.0), line, law)
+        >>> slip = 1e-9 * np.cos(2.0 * line.x)
+        >>> exact = 1.25 * np.cos(2.0 * line.x)
+        >>> float(np.abs(problem.released_stress(slip) - exact).max()) < 1e-9
+        True
+        """
         if self.specimen is not None:
             return np.asarray(self.blocks.stiffness @ slip)
         symbol = self.half_spaces.symbol(self.interface.shape)
@@ -299,6 +354,20 @@ class Problem(Listed):
         slips, and nodes beyond the extent take over stress. The mean
         covers the nodes that can break, and is divided by the mean of
         their load profile.
+
+        The mean of the released stress over the nodes that can break, divided
+        by the mean of their load profile:
+
+        >>> from stiction.problem.friction import LinearWeakening
+        >>> solid, law = Solid(1e9, 0.2, 1200.0), LinearWeakening(critical_slip=1.0)
+        >>> load, slip = Load(profile=np.linspace(1.0, 3.0, 16)), np.linspace(0.0, 2e-6, 16) ** 2
+        >>> problem = Problem(solid, Interface(8.0, 16, extent=(1.0, 4.0)), law, load)
+        >>> inside = problem.interface.breakable
+        >>> means = problem.released_stress(slip)[inside].mean(), load.profile[inside].mean()
+        >>> round(float(problem.relief(slip) / (means[0] / means[1])), 9)
+        1.0
+        >>> Problem(solid, Interface(8.0, 16), law, load).relief(slip)
+        0.0
         """
         if not self.interface.is_held:
             return 0.0 if self.specimen is None else float(self.blocks.mean_relief(slip))
@@ -334,7 +403,28 @@ class Problem(Listed):
 
     @property
     def whole_area(self) -> float | None:
-        """Area of the whole interface, m², also beyond an extent, if `area` is known."""
+        """Area of the whole interface, m², also beyond an extent, if `area` is known.
+
+        Four of eight nodes can break. A force presses the free surfaces of an
+        extent, and the whole of two blocks:
+
+        >>> from stiction.problem.friction import LinearWeakening
+        >>> solid, law = Solid(1e9, 0.2, 1200.0), LinearWeakening(critical_slip=1.0)
+        >>> load, line = Load(pressing_force=6.0), Interface(8.0, 8, width=0.5, extent=(2.0, 5.0))
+        >>> problem = Problem(solid, line, law, load)
+        >>> [float(number) for number in (problem.area, problem.whole_area, problem.given_pressure)]
+        [2.0, 4.0, 3.0]
+        >>> line, blocks = Interface(8.0, 8, extent=(2.0, 5.0)), Blocks(height=4.0, thickness=0.5)
+        >>> problem = Problem(solid, line, law, load, "II", blocks)
+        >>> [float(number) for number in (problem.area, problem.whole_area, problem.given_pressure)]
+        [1.5, 4.0, 1.5]
+        >>> problem = Problem(solid, Interface((8.0, 16.0), (8, 8)), law, Load(normal_pressure=7.0))
+        >>> problem.area, problem.given_pressure, problem.normal_pressure, problem.load_profile
+        (128.0, 7.0, 7.0, 1.0)
+        >>> problem = Problem(solid, Interface(8.0, 8), law)
+        >>> problem.area, problem.whole_area, problem.given_pressure, problem.normal_pressure
+        (None, None, None, None)
+        """
         interface = self.interface
         return self.area and self.area * interface.measure / interface.breakable_measure
 
@@ -382,6 +472,16 @@ class Problem(Listed):
         If the law steepens, W is the steepest rate. An `InputError`
         says that the rate varies along the interface or follows from
         other parameters.
+
+        A law that falls later with 3 times its first slope has a third of the
+        length:
+
+        >>> from stiction.problem.friction import LinearWeakening, PiecewiseWeakening
+        >>> steep = PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.75, 0.0], weakening_rate=1e9)
+        >>> laws = LinearWeakening(weakening_rate=1e9), steep
+        >>> solid, line = Solid(1e9, 0.2, 1200.0), Interface(9.0, 128)
+        >>> [round(Problem(solid, line, law).nucleation_length, 3) for law in laws]
+        [1.447, 0.482]
         """
         if self.friction.uniform_weakening_rate is None:
             raise InputError(
@@ -397,6 +497,15 @@ class Problem(Listed):
         If the law steepens, give its steepest rate, such as
         `Sample.steepest_weakening_rate`. On a plane, the length along x
         belongs to mode II and the length along y to mode III.
+
+        >>> from stiction.problem.friction import LinearWeakening
+        >>> law = LinearWeakening(critical_slip=1.0)
+        >>> line, plane = Interface(8.0, 8), Interface((8.0, 16.0), (8, 8))
+        >>> for interface, mode in ((line, "III"), (plane, "II")):
+        ...     problem = Problem(Solid(1e9, 0.2, 1200.0), interface, law, mode=mode)
+        ...     print([round(length, 4) for length in problem.nucleation_lengths(2e9)])
+        [0.5789]
+        [0.7236, 0.5789]
         """
         if not weakening_rate > 0.0:
             given = describe(weakening_rate)
@@ -428,6 +537,15 @@ def stress_of(problem: Problem, name: str, force: float) -> float:
     """Return force (N) over area that can break, Pa.
 
     An error message begins with `name`.
+
+    >>> from types import SimpleNamespace
+    >>> line = SimpleNamespace(is_held=False)
+    >>> stress_of(SimpleNamespace(area=0.5, specimen=None, interface=line), "force", 3.0)
+    6.0
+    >>> stress_of(SimpleNamespace(area=None), "force", 3.0)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: force: a force needs the area of the interface: ...
     """
     if problem.area is None:
         raise InputError(f"{name}: {NO_AREA}")
@@ -436,7 +554,18 @@ def stress_of(problem: Problem, name: str, force: float) -> float:
 
 
 def warn_of_weld(problem: Problem, name: str) -> None:
-    """Warn that the machine of a specimen carries more than the force on the part that breaks."""
+    """Warn that the machine of a specimen carries more than the force on the part that breaks.
+
+    >>> import warnings
+    >>> from types import SimpleNamespace
+    >>> lines = Interface(8.0, 8, extent=(2.0, 4.0)), Interface(8.0, 8)
+    >>> with warnings.catch_warnings(record=True) as told:
+    ...     warnings.simplefilter("always")
+    ...     for interface, specimen in zip((*lines, lines[0]), ("blocks", "blocks", None)):
+    ...         warn_of_weld(SimpleNamespace(interface=interface, specimen=specimen), "force")
+    >>> [str(warning.message)[:90] for warning in told]
+    ['force: is compared with the shear force on the part that can break, 37.5 % of the interfac']
+    """
     if problem.specimen is not None and problem.interface.is_held:
         percent = 100.0 * problem.interface.breakable_measure / problem.interface.measure
         warn_accuracy(
@@ -446,13 +575,30 @@ def warn_of_weld(problem: Problem, name: str) -> None:
 
 
 def refuse_specimen(problem: Problem, what: str, instead: str) -> None:
-    """Raise an `InputError` with advice, `instead`, if the problem has a specimen."""
+    """Raise an `InputError` with advice, `instead`, if the problem has a specimen.
+
+    >>> from types import SimpleNamespace
+    >>> refuse_specimen(SimpleNamespace(specimen=None), "rupture", "Use onset")
+    >>> refuse_specimen(SimpleNamespace(specimen="blocks"), "rupture", "Use it")
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: problem.specimen: rupture applies to half-spaces only. Use it
+    """
     if problem.specimen is not None:
         raise InputError(f"problem.specimen: {what} applies to half-spaces only. {instead}")
 
 
 def refusals(problem: Problem, method: Any) -> list[str]:
-    """Return the reasons why a method does not accept a problem, or an empty list."""
+    """Return the reasons why a method does not accept a problem, or an empty list.
+
+    >>> from types import SimpleNamespace
+    >>> def method(reasons):
+    ...     return SimpleNamespace(label="onset", supports=lambda problem: reasons)
+    >>> refusals("problem", method(["no law", "no load"])), refusals("problem", method([]))
+    (['method: the onset cannot be used: no law', 'method: the onset cannot be used: no load'], [])
+    >>> refusals("problem", method(True))
+    ['method: supports must return a list of reasons, got True']
+    """
     reasons = method.supports(problem)
     if not isinstance(reasons, list):
         return [f"method: supports must return a list of reasons, got {describe(reasons)}"]

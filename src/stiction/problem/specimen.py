@@ -22,11 +22,20 @@ if TYPE_CHECKING:
 
 
 def _stiffness(value: Any) -> float:
+    """Return a stiffness, N/m, which may be the word inf.
+
+    >>> _stiffness("inf"), _stiffness(3)
+    (inf, 3.0)
+    """
     return math.inf if value == "inf" else as_number(value)
 
 
 def _written(value: float) -> Any:
-    """Return a number, or 'inf' because JSON has no infinite number."""
+    """Return a number, or 'inf' because JSON has no infinite number.
+
+    >>> _written(math.inf), _written(3.0), _written(-math.inf)
+    ('inf', 3.0, -inf)
+    """
     return "inf" if value == math.inf else value
 
 
@@ -138,11 +147,29 @@ SLIDER_DRIVES = _kinds("drives of sliders", pusher="Pusher", top_shear="TopShear
 
 
 def _only(*kinds: type) -> Callable[[Any], Any]:
+    """Return a reader that accepts members of some classes only.
+
+    >>> reader, drive = _only(Pusher, TopShear), TopShear()
+    >>> reader(drive) is drive, reader(Platen()), reader("platen")
+    (True, NotImplemented, NotImplemented)
+    """
     return lambda value: value if isinstance(value, kinds) else NotImplemented
 
 
 def _beyond_side(drive: Any, height: float) -> list[str]:
-    """Return messages about a pusher that does not fit the side of a body with a height (m)."""
+    """Return messages about a pusher that does not fit the side of a body with a height (m).
+
+    >>> pusher = Pusher(height=0.02, width=0.04)
+    >>> _beyond_side(pusher, 0.04), _beyond_side(Platen(), 0.04)
+    ([], [])
+    >>> for height in (0.03, 0.02):
+    ...     (text,) = _beyond_side(pusher, height)
+    ...     print(text.partition(", but ")[2])
+    the side is 0 to 0.03 m high. Give a width of at most 0.02 m
+    the side is 0 to 0.02 m high. Give a height of at most 0 m
+    >>> _beyond_side(Pusher(height=0.02, width=0.05), 0.06)[0][-30:]
+    'Give a width of at most 0.04 m'
+    """
     if not isinstance(drive, Pusher):
         return []
     low, high = drive.height - 0.5 * drive.width, drive.height + 0.5 * drive.width
@@ -205,7 +232,14 @@ class Blocks(Listed):
 
     @property
     def pushes(self) -> Pushes | None:
-        """Sides, height and width (m) of pushers. A platen has no pushers."""
+        """Sides, height and width (m) of pushers. A platen has no pushers.
+
+        >>> for side in ("both", "right"):
+        ...     print(Blocks(height=0.05, drive=Pusher(height=0.02, width=0.01, side=side)).pushes)
+        Pushes(sides=('left', 'right'), height=0.02, width=0.01)
+        Pushes(sides=('right',), height=0.02, width=0.01)
+        >>> Blocks(height=0.05).pushes
+        """
         drive = self.drive
         if isinstance(drive, Platen):
             return None
@@ -215,7 +249,22 @@ class Blocks(Listed):
         return Pushes(sides, drive.height, drive.width)
 
     def driven(self, length: float, nodes: int, solid: Solid, mode: Mode) -> Driven:
-        """Return the stiffness and the profiles of the blocks and their machine, at the nodes."""
+        """Return the stiffness and the profiles of the blocks and their machine, at the nodes.
+
+        Half of the symmetric set-up has twice the stiffness, 3e6 N/m, over the
+        thickness:
+
+        >>> from unittest.mock import patch
+        >>> solid = Solid(1e9, 0.2, 1200.0)
+        >>> for pressing, stiffness in (("glued", 3e6), ("frictionless", math.inf)):
+        ...     drive = Platen(stiffness=stiffness)
+        ...     blocks = Blocks(height=0.05, thickness=0.004, drive=drive, pressing=pressing)
+        ...     with patch("stiction.elasticity.driven.driven") as called:
+        ...         _ = blocks.driven(0.3, 64, solid, "III" if pressing == "glued" else "II")
+        ...     print(*called.call_args.args)
+        0.3 64 0.05 1000000000.0 2.2 True None True 1500000000.0
+        0.3 64 0.05 1000000000.0 2.2 False None False inf
+        """
         from stiction.elasticity.driven import driven  # scipy takes half a second
 
         machine = self.drive.stiffness
@@ -318,12 +367,27 @@ class Slider(Listed):
 
     @property
     def machine(self) -> float:
-        """Machine stiffness per unit depth, Pa."""
+        """Machine stiffness per unit depth, Pa.
+
+        >>> drive = Pusher(height=0.02, width=0.01, side="right", stiffness=3e6)
+        >>> slider = Slider(height=0.07, thickness=0.004, base=Base(height=0.03), drive=drive)
+        >>> dead = Slider(height=0.07, base=Base(height=0.03), drive=TopShear())
+        >>> round(slider.machine, 3), dead.machine
+        (750000000.0, 0.0)
+        """
         return self.drive.stiffness / (self.thickness or 1.0)
 
     @property
     def towards(self) -> Literal[-1, 1]:
-        """Direction of the push along x."""
+        """Direction of the push along x.
+
+        >>> drives = [Pusher(height=0.02, width=0.01, side=side) for side in ("left", "right")]
+        >>> for drive in (*drives, TopShear()):
+        ...     print(Slider(height=0.07, base=Base(height=0.03), drive=drive).towards)
+        1
+        -1
+        1
+        """
         return -1 if isinstance(self.drive, Pusher) and self.drive.side == "right" else 1
 
     def toppling_ratio(self, length: float) -> float:
@@ -331,6 +395,15 @@ class Slider(Listed):
 
         The push F moves the pressure by h F/N towards the leading end,
         from the middle or, for a tilted press, from tilt L/6.
+
+        >>> pusher = Pusher(height=0.02, width=0.01)
+        >>> plate = {"pressing": "plate"}
+        >>> for drive, given in ((pusher, {"tilt": 0.6}), (TopShear(), {}), (pusher, plate)):
+        ...     slider = Slider(height=0.075, base=Base(height=0.03), drive=drive, **given)
+        ...     print(round(slider.toppling_ratio(0.15), 9))
+        3.0
+        1.0
+        inf
         """
         if self.pressing == "plate":
             return math.inf
@@ -338,7 +411,19 @@ class Slider(Listed):
         return length * (0.5 - self.tilt / 6.0) / high
 
     def rig(self, length: float, nodes: int, solid: Solid) -> Rig:
-        """Return the stiffness and the loads of the rig, per unit depth."""
+        """Return the stiffness and the loads of the rig, per unit depth.
+
+        >>> from unittest.mock import patch
+        >>> drive, below = Pusher(height=0.02, width=0.01, side="right"), Solid(3e9, 0.25, 1e3)
+        >>> base = Base(height=0.03, behind=0.06, ahead=0.1, solid=below, bottom="rollers")
+        >>> slider = Slider(height=0.075, base=base, drive=drive, tilt=0.5)
+        >>> with patch("stiction.elasticity.rig.contact_rig") as called:
+        ...     _ = slider.rig(0.3, 64, Solid(1e9, 0.2, 1200.0))
+        >>> [getattr(body, "height", body) for body in called.call_args.args]
+        [0.3, 64, 0.075, 0.03]
+        >>> [*called.call_args.args[3]], [*called.call_args.kwargs.values()][1:]
+        ([0.03, 3000000000.0, 2.0], ['soft', 0.5, 0.06, 0.1, 'rollers', -1])
+        """
         from stiction.elasticity.blocks import Pushes  # scipy takes half a second
         from stiction.elasticity.columns import Body
         from stiction.elasticity.rig import contact_rig
@@ -359,6 +444,18 @@ class Slider(Listed):
         """Return 2/(a (1 - beta^2)), Pa, which is G* for equal materials.
 
         a = sum (kappa + 1)/(4 G), and beta is Dundurs' second constant.
+
+        >>> slider = Slider(height=0.1, base=Base(height=0.1), drive=TopShear())
+        >>> soft = Solid(1e9, 0.2, 1e3)
+        >>> f"{slider.effective_modulus(soft):.6g} {soft.effective_modulus():.6g}"
+        '1.25e+09 1.25e+09'
+
+        With kappa = 2.2 and 1.8, a = 0.975/GPa and a beta = 0.25/GPa:
+
+        >>> base = Base(height=0.1, solid=Solid(4e9, 0.3, 1e3))
+        >>> modulus = Slider(height=0.1, base=base, drive=TopShear()).effective_modulus(soft)
+        >>> f"{modulus:.6g} {2e9 * 0.975 / (0.975**2 - 0.25**2):.6g}"
+        '2.19564e+09 2.19564e+09'
         """
         slider, base = (
             np.add(of.kolosov, [1.0, -1.0]) / (4.0 * of.shear_modulus)
@@ -368,7 +465,25 @@ class Slider(Listed):
         return float(2.0 * a / (a**2 - b**2))
 
     def misfits(self, length: float, spacing: float, solid: Solid, mode: Mode) -> list[str]:
-        """Return messages about a slider that does not fit an interface (m) and a material."""
+        """Return messages about a slider that does not fit an interface (m) and a material.
+
+        >>> solid, base = Solid(1e9, 0.2, 1e3), Base(height=0.0625, behind=4.0, ahead=5.5)
+        >>> drive = Pusher(height=0.05, width=0.03125)
+        >>> slider = Slider(height=0.125, base=base, drive=drive)
+        >>> slider.misfits(0.275, 0.03125, solid, "II")
+        []
+        >>> for text in slider.misfits(0.25, 0.0625, solid, "III"):
+        ...     print(text[:79])
+        mode: a slider is sheared in its plane. Keep mode='II'
+        specimen.base.height: is not resolved by nodes 0.0625 m apart. Give interface.n
+        specimen.drive.width: is not resolved by nodes 0.0625 m apart. Give interface.n
+        specimen.base.ahead: 5.5 m is more than 20 times the length of the slider, 0.25
+        >>> slider.misfits(0.28, 0.0625, solid, "II")[1][-27:]
+        'interface.nodes = 9 or more'
+        >>> base = Base(height=0.1, solid=Solid(1e9, 0.2, 1e3, "stress"))
+        >>> Slider(height=0.1, base=base, drive=TopShear()).misfits(0.25, 0.05, solid, "II")
+        ["specimen.base.solid.plane: must be the slider's 'strain'"]
+        """
         problems, base = [], self.base
         if mode != "II":
             problems.append("mode: a slider is sheared in its plane. Keep mode='II'")
@@ -400,6 +515,24 @@ class Slider(Listed):
         is not defined. Coupling must not let the slip at a node shear
         other nodes forwards, and the slider must not topple before it
         slides.
+
+        The coupling between the two cells is 0.2 and 0.1. The smaller limit is
+        (0.01 x 8 + 1)/0.2:
+
+        >>> from types import SimpleNamespace
+        >>> K = np.array([[10.0, -1.0], [-1.0, 8.0], [9.0, 0.2], [0.0, 0.0], [0.1, 9.0]])
+        >>> rig = SimpleNamespace(K=K, T_p=np.array([7.0, 7.0, -0.1, -0.3, 0.1]))
+        >>> slider = Slider(height=0.02, base=Base(height=0.03), drive=TopShear())
+        >>> residual = np.array([[1.0, 8.0], [6.0, 3.8]])
+        >>> slider.checked_pressing(rig, 0.2, np.full((2, 2), 5.39), residual).round(9).tolist()
+        [0.5, 0.1]
+        >>> for peak, more in ((5.41, 0.0), (4.0, 0.2)):
+        ...     try:
+        ...         slider.checked_pressing(rig, 0.2, np.full((2, 2), peak), residual + more)
+        ...     except InputError as error:
+        ...         print(str(error)[-46:])
+        friction coefficients up to 5.4 only, got 5.41
+         its residual friction is 5.1. Lower the drive
         """
         from stiction.elasticity.rig import on_cells
 
