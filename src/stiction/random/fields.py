@@ -254,10 +254,10 @@ class RandomField(Listed):
         ...         field.warn_if_inaccurate(Interface(0.1, nodes))
         ...     return [str(text) for text in texts]
         >>> lost, short = warned(8, False)
-        >>> lost[85:122], lost[147:]
-        ('6.7 % of the variance is not resolved', 'give interface.nodes >= 10 or power_kept=0.933')
+        >>> lost[85:123], lost[148:]
+        ('6.67 % of the variance is not resolved', 'give interface.nodes >= 10 or power_kept=0.933')
         >>> short[:67]
-        'the field has no mean mode, which would hold 17 % of the variance o'
+        'the field has no mean mode, which would hold 16.7 % of the variance'
         >>> len(warned(8, True)), warned(10, True)
         (1, [])
         """

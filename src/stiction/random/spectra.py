@@ -180,12 +180,13 @@ def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
     (0.2, True)
 
     This density has its power near 50 rad/m. The correlation oscillates,
-    almost as exp(-x^2) cos(50 x), and 0.5 is first reached near 50 x = pi/3:
+    almost as exp(-x^2) cos(50 x), and 0.3 = cos(1.27) is first reached near
+    50 x = 1.27:
 
     >>> narrow = CustomSpectrum(lambda k: np.exp(-0.25 * (k - 50.0) ** 2), 60.0)
-    >>> lag = lag_of_correlation(narrow, 0.5)
+    >>> lag = lag_of_correlation(narrow, 0.3)
     >>> round(50.0 * lag, 2), round(math.exp(-(lag**2)) * math.cos(50.0 * lag), 6)
-    (1.05, 0.5)
+    (1.27, 0.3)
     """
     # The slope of the correlation is at most the mean wavenumber.
     # Between lags that are close against the root mean square of the

@@ -479,12 +479,13 @@ def layout(random: Any, interface: Any) -> list[Stream]:
     ... )
     >>> for stream in layout(random, Interface(0.1, 8)):
     ...     columns = stream.columns.start, stream.columns.stop
-    ...     print(stream.number, stream.numbers.tolist(), columns, stream.of_property)
-    0 [0, 2, 3] (0, 3) [1 2]
-    1 [0, 2, 3] (3, 6) [0 1 2]
-    6 [2, 3] (6, 8) [0 1]
-    1007 [0] (8, 9) None
-    1004 [0] (9, 10) None
+    ...     modes = [] if stream.of_property is None else stream.of_property.tolist()
+    ...     print(stream.number, stream.numbers.tolist(), columns, modes)
+    0 [0, 2, 3] (0, 3) [1, 2]
+    1 [0, 2, 3] (3, 6) [0, 1, 2]
+    6 [2, 3] (6, 8) [0, 1]
+    1007 [0] (8, 9) []
+    1004 [0] (9, 10) []
     >>> {stream.block for stream in layout(random, Interface(0.1, 8))}
     {256}
     >>> [stream.block for stream in layout(random, Interface((0.1, 0.05), (8, 8)))]
