@@ -224,6 +224,15 @@ def _as_table(name: str, design: Any, second: str) -> dict[str, Any]:
     """Return a design as a table with tests and the key `second`.
 
     A number, or a mapping of lengths, states the tests.
+
+    >>> _as_table("a", 7, "profiles"), _as_table("a", {"profiles": 2}, "profiles")
+    ({'tests': 7}, {'tests': 0, 'profiles': 2})
+    >>> _as_table("a", {0.1: 7, 0.2: 3}, "known")
+    {'tests': {0.1: 7, 0.2: 3}}
+    >>> _as_table("a", {"tests": 7, "knowns": 3}, "known")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: designs: a: unknown 'knowns'; did you mean 'known'? ...
     """
     is_table = isinstance(design, Mapping) and any(isinstance(key, str) for key in design)
     table, keys = dict(design) if is_table else {"tests": design}, ("tests", second)
@@ -235,7 +244,30 @@ def _as_table(name: str, design: Any, second: str) -> dict[str, Any]:
 def _plans(
     designs: dict[str, Any], names: tuple[str, ...]
 ) -> dict[str, tuple[dict[float | None, int], list[int]]]:
-    """Return the numbers of tests by length (m), and the positions of the unknown parameters."""
+    """Return the numbers of tests by length (m), and the positions of the unknown parameters.
+
+    >>> design = {"tests": {0.1: 4, 0.2: 1}, "known": ["y"]}
+    >>> plans = _plans({"a": 7, "b": design}, ("x", "y", "z"))
+    >>> plans["a"], plans["b"]
+    (({None: 7}, [0, 1, 2]), ({0.1: 4, 0.2: 1}, [0, 2]))
+    >>> def refused(design):
+    ...     try:
+    ...         _plans(design, ("x", "y"))
+    ...     except InputError as error:
+    ...         print(str(error).split(" (")[0].split(". ")[0])
+    >>> refused({})
+    designs: must not be empty
+    >>> for design in ({}, {0.1: 4, 0.2: 0}, {"known": ["x"]}, 1.5):
+    ...     refused({"a": 1, "b": design})
+    designs: b: tests: must be a whole number >= 1 per length
+    designs: b: tests: must be a whole number >= 1 per length
+    designs: b: tests: must be a whole number >= 1 per length
+    designs: b: tests: must be a whole number >= 1 per length
+    >>> refused({"a": {"tests": 1, "known": ["x", "w"]}})
+    designs: a: known: unknown 'w'
+    >>> refused({"a": {"tests": 1, "known": ["y", "x"]}})
+    designs: a: known: lists all parameters
+    """
     if not designs:
         raise InputError("designs: must not be empty")
     plans = {}
@@ -261,7 +293,32 @@ def _information(
     simulated: Likelihood, tests: list[int], free: list[int], repetitions: int,
     simulation: Simulation,
 ) -> Array:  # fmt: skip
-    """Return the expected information about each parameter, and the standard error, as (2, ...)."""
+    """Return the expected information about each parameter, and the standard error, as (2, ...).
+
+    Two kinds of peaks are normal here, with the standard deviation s about a parameter. The
+    entropy of the posterior is log(s/sqrt(n) (2 pi e)^(1/2)) for n peaks, and of the prior 0. A
+    known parameter has NaN.
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.base.progress import SILENT
+    >>> class Exact:
+    ...     def __init__(self, peaks=()):
+    ...         self.peaks, self.box = peaks, np.array([[0.0, 0.0], [1.0, 1.0]])
+    ...         self.prior = SimpleNamespace(dimension=2)
+    ...     def predicted(self, kind, u, seed):
+    ...         rng = np.random.default_rng(seed)
+    ...         return kind + u[:, 1] + 0.01 * rng.standard_normal(len(u))
+    ...     def of(self, peaks):
+    ...         return Exact(peaks)
+    ...     def __call__(self, u):
+    ...         away = [p - kind - u[:, 1:] for kind, p in enumerate(self.peaks)]
+    ...         return -0.5 * (np.concatenate(away, axis=1) ** 2).sum(axis=1) / 0.01**2
+    >>> setting = SimpleNamespace(seed=0, meter=SILENT)
+    >>> mean, error = _information(Exact(), [3, 1], [1], 40, setting)
+    >>> expected = math.log(math.sqrt(4) / 0.01 / math.sqrt(2.0 * math.pi * math.e))
+    >>> f"{mean[1] - expected:.1f} {mean[0]}", bool(0.0 < error[1] < 0.03)
+    ('0.0 nan', True)
+    """
     rng, dimension = np.random.default_rng([simulation.seed, 2]), simulated.prior.dimension
     gains = np.full((repetitions, dimension), np.nan)
     for row in range(repetitions):
@@ -298,6 +355,16 @@ def _further(designs: dict[str, Any]) -> dict[str, tuple[int, int]]:
     """Return the numbers of further tests and profiles.
 
     The first design is the present.
+
+    >>> _further({"a": 7, "b": {"tests": 1, "profiles": 2}, "c": {"profiles": 3}})
+    {'now': (0, 0), 'a': (7, 0), 'b': (1, 2), 'c': (0, 3)}
+    >>> for design in (0, {"tests": 1, "profiles": -1}):  # doctest: +ELLIPSIS
+    ...     try:
+    ...         _further({"a": design})
+    ...     except InputError as error:
+    ...         print(str(error).split(", ")[-1])
+    got 0 and 0
+    got 1 and -1
     """
     plans = {"now": (0, 0)}
     for name, design in designs.items():
@@ -318,6 +385,53 @@ def _present(
 
     Specimens of the problem come first. Further tests and the design
     are for them.
+
+    The fields with the largest mass stay, and specimens of the problem come first.
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.inference.specimens import Onsets, Profiles
+    >>> problem = SimpleNamespace(interface=SimpleNamespace(measure=0.1))
+    >>> names, within = tuple(f"field {i}" for i in range(14)), np.arange(28.0).reshape(14, 2)
+    >>> profiles = Profiles(names, 1e6, np.ones(2), within)
+    >>> ratios = np.arange(14.0).reshape(14, 1, 1)
+    >>> onsets = tuple(Onsets(np.zeros(1), k + ratios, ()) for k in (0, 50))
+    >>> tables = Tables(profiles, None, onsets, 3.0, (np.array([6.0]), np.array([7.0])))
+    >>> mass = np.r_[0.0, 3.0, np.ones(11), 2.0].reshape(14, 1, 1, 1)
+    >>> posterior = SpecimenPosterior(
+    ...     peaks=Peaks((0.2, 0.1), tables.peaks, "Pa"), draws={}, u=None, by_profiles=None,
+    ...     monte_carlo_error=0.1, problem=problem, likelihood=tables,
+    ...     grid=SimpleNamespace(mass=mass / mass.sum()))
+    >>> fewer = _present(problem, posterior, None, "Pa", 0.0)
+    >>> [name.split()[1] for name in fewer.profiles.fields]
+    ['1', '13', '2', '3', '4', '5', '6', '7', '8', '9', '10', '11']
+    >>> fewer.profiles.within[:2].tolist(), [peaks.tolist() for peaks in fewer.peaks]
+    ([[2.0, 3.0], [26.0, 27.0]], [[7.0], [6.0]])
+    >>> [kind.ratios[:2].ravel().tolist() for kind in fewer.onsets]
+    [[51.0, 63.0], [1.0, 13.0]]
+    >>> other = SimpleNamespace(interface=SimpleNamespace(measure=0.3))
+    >>> for given, inferred in ((other, replace(posterior, problem=other)), (other, posterior)):
+    ...     try:
+    ...         _present(given, inferred, None, "Pa", 0.0)
+    ...     except InputError as error:
+    ...         print(error)
+    random: no peak is from a specimen of the problem, 0.3 m
+    problem: must be the problem of the posterior
+
+    Given profiles, all fields are equally likely.
+
+    >>> from unittest.mock import patch
+    >>> setting = SimpleNamespace(seed=0)
+    >>> def simulated(problem, profiles, simulation, peaks, error):
+    ...     return replace(tables, error=error, peaks=peaks.values)
+    >>> with patch("stiction.inference.design.tables_of", simulated):
+    ...     fewer = _present(problem, profiles, setting, "kPa", 4.0)
+    >>> fewer.profiles.fields == names[:12], fewer.error, fewer.peaks[0].size
+    (True, 4.0, 0)
+    >>> bare = profiles._replace(levels=np.zeros(0))
+    >>> _present(problem, bare, setting, "kPa", 3.0)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: random: must be a fit or a posterior ...
     """
     if isinstance(random, SpecimenPosterior):
         if problem != random.problem:
@@ -350,7 +464,47 @@ def _widths(
     tables: Tables, plans: dict[str, tuple[int, int]], probability: float, repetitions: int,
     simulation: Simulation, scale: float,
 ) -> xr.Dataset:  # fmt: skip
-    """Return widths of intervals and design stresses after further measurements."""
+    """Return widths of intervals and design stresses after further measurements.
+
+    Without further measurements, the first design describes the present posterior. (Predictions
+    are replaced by numbers here.)
+
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import patch
+    >>> import stiction as st
+    >>> from stiction.inference.specimens import Onsets, Profiles
+    >>> field = st.RandomField(st.Lognormal(mean=2e6, cv=0.1), st.ExponentialSpectrum(1e-3))
+    >>> levels, within = np.array([1.9e6, 2.3e6]), np.array([[0.01, 0.02]])
+    >>> fields = (st.RandomInterface(strength=field),)
+    >>> profiles = Profiles(fields, 2e6, levels, within, ("lognormal",))
+    >>> onsets = (Onsets(np.zeros(1), np.full((1, 1, 1), 8e5), ()),)
+    >>> tables = Tables(profiles, None, onsets, 0.0, (np.zeros(0),))
+    >>> def prediction(both, grid):
+    ...     levels = both.profiles.levels.size
+    ...     return SimpleNamespace(quantile=lambda probability: levels * probability)
+    >>> setting, plans = Simulation(None, None, 0), {"now": (0, 0), "more": (0, 5)}
+    >>> with patch("stiction.inference.design.Prediction", prediction):
+    ...     found = _widths(tables, plans, 0.25, 2, setting, 3.0)
+    >>> names = "design_stress", "design_low", "design_high"
+    >>> [found[name].values.tolist() for name in names]  # 2*0.25*3 and 7*0.25*3
+    [[1.5, 5.25], [1.5, 5.25], [1.5, 5.25]]
+    >>> now = grid_of_profiles(profiles)[0]
+    >>> drawn = now.described(now.draws(20_000, np.random.default_rng(5)))
+    >>> for name, width in zip(found.parameter.values, found.width[0].values, strict=True):
+    ...     low, high = np.quantile(drawn[name], [0.05, 0.95])
+    ...     print(name, 0.9 < width / (high - low) < 1.1)
+    mean True
+    between True
+    >>> bool((found.width[1] < found.width[0]).all()), found.design.values.tolist()
+    (True, ['now', 'more'])
+    >>> bool((found.standard_error[0] < 0.1 * found.width[0]).all()), found.attrs
+    (True, {'probability': 0.25, 'repetitions': 2})
+    >>> bare = replace(tables, profiles=profiles._replace(levels=np.zeros(0)))
+    >>> _widths(bare, {"a": (0, 0), "b": (0, 9)}, 0.01, 2, setting, 1.0)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: designs: profiles: need a fit, ...
+    """
     if any(levels for _, levels in plans.values()) and not tables.profiles.levels.size:
         raise InputError("designs: profiles: need a fit, which gives the length of profiles")
     _, now = grid_of_profiles(tables.profiles, tables)
@@ -388,7 +542,44 @@ def _widths(
 def _after(
     tables: Tables, truth: Array, tests: int, levels: int, rng: np.random.Generator
 ) -> tuple[FactorGrid, Tables]:
-    """Return the posterior after further tests and profiles for a true draw (1, 4) (steps 6, 7)."""
+    """Return the posterior after further tests and profiles for a true draw (1, 4) (steps 6, 7).
+
+    The true field is the first, with the mean 1.5 times the reference and almost no scatter.
+    A further level has the mean variance of the present levels within each field.
+
+    >>> from unittest.mock import patch
+    >>> from stiction.inference.specimens import Onsets, Profiles
+    >>> levels, within = np.array([1.9e6, 2.2e6]), np.array([[0.0, 0.0], [0.04, 0.08]])
+    >>> profiles = Profiles(("first", "second"), 2e6, levels, within, ("lognormal", "normal"))
+    >>> onsets = tuple(Onsets(np.zeros(1), np.full((2, 1, 1), r), ()) for r in (8e5, 9e5))
+    >>> tables = Tables(profiles, None, onsets, 0.0, (np.array([7e5]), np.array([6e5])))
+    >>> truth = np.array([[0.0, 0.0, 1e-6, math.log(1.5)]])
+    >>> def after(truth, levels):
+    ...     changed = {"grid_of_profiles": lambda *given: (None, given)}
+    ...     with patch.multiple("stiction.inference.design", **changed):
+    ...         return _after(tables, truth, 2, levels, np.random.default_rng(0))
+    >>> given, both = after(truth, 3)
+    >>> given[0] is both.profiles, given[1] is both
+    (True, True)
+    >>> (both.profiles.levels / 1e6).round(3).tolist()
+    [1.9, 2.2, 3.0, 3.0, 3.0]
+    >>> both.profiles.within.round(9).tolist()
+    [[0.0, 0.0, 0.0, 0.0, 0.0], [0.04, 0.08, 0.06, 0.06, 0.06]]
+    >>> [(peaks / 1e5).round(3).tolist() for peaks in both.peaks]
+    [[7.0, 12.0, 12.0], [6.0]]
+
+    In the second field, logarithms have the variance 0.06, and levels keep their mean. A factor
+    adds the variance log(1 + 0.3^2).
+
+    >>> truth[:] = 1.0, 0.0, 1e-6, math.log(1.5)
+    >>> levels = after(truth, 20_000)[1].profiles.levels[2:] / 3e6
+    >>> f"{np.log(levels).var():.2f} {levels.mean():.2f}"
+    '0.06 1.00'
+    >>> truth[:] = 1.0, 0.0, 0.3, math.log(1.5)
+    >>> levels = after(truth, 20_000)[1].profiles.levels[2:] / 3e6
+    >>> f"{np.log(levels).var():.2f} {levels.mean():.1f}"
+    '0.15 1.0'
+    """
     profiles = tables.profiles
     peaks = tables.predicted(0, np.repeat(truth, tests, axis=0), int(rng.integers(2**31)))
     field, family, cv, log_mean = truth[0]

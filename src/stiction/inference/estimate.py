@@ -117,7 +117,24 @@ class BestFit:
 
     @cached_property
     def parameters(self) -> dict[str, float]:
-        """All estimated parameters and derived numbers, by name.
+        """All estimated parameters and derived numbers, by name."""
+        lags = self.model.spectrum.correlation_length * LAGS
+        correlation = self.model.spectrum.untruncated_correlation(lags)
+        values = {
+            "efolding_length": float(np.interp(-math.exp(-1.0), -correlation, lags)),
+            "mean": float(self.marginal.distribution.mean()),
+            "standard_deviation": float(self.marginal.distribution.std()),
+        }
+        of_marginal = self.setting.marginal.parameters(self.marginal)
+        values |= {f"marginal.{name}": value for name, value in of_marginal.items()}
+        free = self.setting.spectrum.of(self.model)
+        values |= {name: value for name, value in free.items() if name in OF_SPECTRUM}
+        if "noise_share" in free:
+            values["noise"] = self.model.noise
+        return values
+
+    def field(self, quantity: str) -> RandomField:
+        """Return the field for simulations.
 
         >>> from stiction.inference.marginal_fit import family_of
         >>> from stiction.random.marginals import Lognormal
@@ -140,23 +157,6 @@ class BestFit:
         >>> turned.marginal == law, turned.spectrum == model.spectrum
         (True, True)
         """
-        lags = self.model.spectrum.correlation_length * LAGS
-        correlation = self.model.spectrum.untruncated_correlation(lags)
-        values = {
-            "efolding_length": float(np.interp(-math.exp(-1.0), -correlation, lags)),
-            "mean": float(self.marginal.distribution.mean()),
-            "standard_deviation": float(self.marginal.distribution.std()),
-        }
-        of_marginal = self.setting.marginal.parameters(self.marginal)
-        values |= {f"marginal.{name}": value for name, value in of_marginal.items()}
-        free = self.setting.spectrum.of(self.model)
-        values |= {name: value for name, value in free.items() if name in OF_SPECTRUM}
-        if "noise_share" in free:
-            values["noise"] = self.model.noise
-        return values
-
-    def field(self, quantity: str) -> RandomField:
-        """Return the field for simulations."""
         options: Any = {"mean_mode": True}
         if self.model.anisotropy != 1.0:
             options["anisotropy"] = self.model.anisotropy
@@ -216,6 +216,9 @@ class BestFit:
         ...     model=SimpleNamespace(correlation=white), parameters={"standard_deviation": 3})
         >>> BestFit.of_means.fget(fit).round(9).tolist()
         [2.25, 1.125, 2.25]
+        >>> fit = SimpleNamespace(of_means=np.array([3.0, 8.0]), parameters={"mean": 2.0})
+        >>> np.exp(BestFit.within.func(fit)).round(9).tolist()  # 1 + 3/4 and 1 + 8/4
+        [1.75, 3.0]
         """
         windows, model = self.setting.windows, self.model
         shares = {w: w.variance_of_mean(model.correlation(w)) for w in set(windows)}
@@ -224,13 +227,7 @@ class BestFit:
 
     @cached_property
     def within(self) -> Array:
-        """Variance that the field alone causes in the log mean of each record.
-
-        >>> from types import SimpleNamespace
-        >>> fit = SimpleNamespace(of_means=np.array([3.0, 8.0]), parameters={"mean": 2.0})
-        >>> np.exp(BestFit.within.func(fit)).round(9).tolist()  # 1 + 3/4 and 1 + 8/4
-        [1.75, 3.0]
-        """
+        """Variance that the field alone causes in the log mean of each record."""
         return np.log1p(self.of_means / self.parameters["mean"] ** 2)
 
     def chance_of_scatter(self, levels: Array) -> float:
@@ -264,8 +261,8 @@ class BestFit:
         ('2.882353', '2.882353')
         >>> independent(0.5, lambda window: np.ones_like(window.pairs)), 14**2 / (11 + 9.75)
         ('9.445783', 9.44578313253012)
-        >>> independent(0.0, lambda window: np.zeros_like(window.pairs))
-        '14.000000'
+        >>> [independent(0.0, lambda window: rho * np.ones_like(window.pairs)) for rho in (0.0, -0.5)]
+        ['14.000000', '14.000000']
         """
         points, alike = 0.0, 0.0
         for window, count in Counter(self.setting.windows).items():
@@ -288,11 +285,11 @@ class BestFit:
         ...         SimpleNamespace(measured=np.array(m), spacings=spacings) for m in measured]
         ...     return BestFit.lengths_held.fget(SimpleNamespace(
         ...         setting=SimpleNamespace(windows=windows),
-        ...         model=SimpleNamespace(spectrum=length, anisotropy=2.0)))
+        ...         model=SimpleNamespace(spectrum=length, anisotropy=4.0)))
         >>> held((0.25,), [True] * 4, [True, True, False, True, True, True])  # 9*0.25/0.5
         4.5
-        >>> held((0.25, 0.5), [[True, True, True], [False, True, True]])  # 5*0.125/(0.5*1)
-        1.25
+        >>> held((0.25, 0.5), [[True, True, True], [False, True, True]])  # 5*0.125/(0.5*2)
+        0.625
         """
         windows, length = self.setting.windows, self.model.spectrum.correlation_length
         area = sum(float(one.measured.sum()) * math.prod(one.spacings) for one in windows)
@@ -343,10 +340,13 @@ def estimate(
     >>> with patch("stiction.inference.estimate._estimate", fit), collect_warnings() as caught:
     ...     estimated = estimate(rows, SimpleNamespace(between=True))
     ...     alone = estimate(["row"], SimpleNamespace(between=False), estimated).between
+    ...     again = estimate(rows, SimpleNamespace(between=True), estimated)
     [2.8234, 2.8234, 2.8234] None
     ['scaled'] from a start
     ['scaled'] from a start
     ['row'] from a start
+    ['scaled'] from a start
+    ['scaled'] from a start
     >>> f"{alone} {math.log1p(estimated.between**2):.6f}", caught  # 0.13 - 0.05
     ('0.0 0.080000', [])
     """
