@@ -112,6 +112,41 @@ def bootstrapped(
     The second list holds fits from `further` estimates, with other
     numbers of repetitions. Records to which the family cannot be fitted
     are left out.
+
+    Examples
+    --------
+    Simulated records are one random number here, and the fit to a number below 0.1 fails.
+
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import patch
+    >>> def field(name, *free):
+    ...     setting = SimpleNamespace(
+    ...         spectrum=SimpleNamespace(free=free), marginal=SimpleNamespace(label=name))
+    ...     draw = np.random.Generator.random
+    ...     return SimpleNamespace(name=name, setting=setting, simulate=draw)
+    >>> def fit(row, setting, start):
+    ...     if row < 0.1:
+    ...         raise InputError("too small")
+    ...     return start.name, row
+    >>> def ends(around):
+    ...     return [field(f"{end} than {around.truth.name}") for end in ("shorter", "longer")]
+    >>> with patch.multiple("stiction.inference.bootstrap", estimate=fit, at_ends=ends):
+    ...     moved, further = bootstrapped(
+    ...         field("a", "correlation_length"), 25, 3, False, [(field("b"), 24)])
+    ...     alone, _ = bootstrapped(field("c"), 25, 3, False)
+    ...     bootstrapped(field("d"), 21, 3, False)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.inference.bootstrap.NotRepeated: marginal: 'd' could be fitted to only 19 of 21 ...
+    >>> [(one.truth.name, len(one.fits)) for one in moved]
+    [('a', 23), ('shorter than a', 23), ('longer than a', 23)]
+    >>> [(one.truth.name, len(one.fits)) for one in (*further, *alone)]
+    [('b', 22), ('c', 23)]
+    >>> rows = [np.random.default_rng([3, number]).random() for number in range(25)]
+    >>> rows[0] < 0.1, rows[2] < 0.1, sum(row >= 0.1 for row in rows)
+    (True, True, 23)
+    >>> all(one.fits == [(one.truth.name, row) for row in rows if row >= 0.1] for one in moved)
+    True
     """
 
     def repeat(truth: BestFit, count: int = count) -> Refits:
