@@ -269,10 +269,12 @@ class Scale(NamedTuple):
 
         >>> from types import SimpleNamespace
         >>> numbers = {"efolding_length": 9.0, "standard_deviation": 2.0}
-        >>> numbers |= {"mean": 5.0, "exponent": 1.5}
+        >>> numbers |= {"mean": 5.0, "exponent": 1.5, "skew": -1.0}
         >>> fit = SimpleNamespace(parameters=numbers, noise=(0.3, 0.1))
-        >>> Scale("mean", True).of(fit), Scale("exponent").of(fit), Scale("noise").of(fit)
-        ((5.0, 6.0), (0.0, 3.0), (0.3, 0.1))
+        >>> Scale("mean", True).of(fit), Scale("skew", True).of(fit)
+        ((5.0, 6.0), (-1.0, 3.0))
+        >>> Scale("exponent").of(fit), Scale("noise").of(fit)
+        ((0.0, 3.0), (0.3, 0.1))
         """
         if self.name == "noise":
             return fitted.noise
@@ -356,6 +358,8 @@ def intervals(repeated: Sequence[Refits], values: Array) -> dict[str, tuple[floa
     >>> ends = intervals([around, shorter, longer], np.array([2.5, 8.0]))
     >>> np.round(ends["shape"], 6).tolist()  # from 3 + 0.9 to 60 + 0.1*10, for 10/2 to 10*5
     [3.9, 61.0]
+    >>> ends["anisotropy"]  # 25/5 at both ends, so the range is shown
+    (0.05, 20.0)
 
     Without any error, the interval of a limited parameter is the whole range.
 
@@ -376,6 +380,10 @@ def intervals(repeated: Sequence[Refits], values: Array) -> dict[str, tuple[floa
     >>> names = "noise", "marginal.low", "marginal.high"
     >>> [np.round(ends[name], 4).tolist() for name in names]
     [[0.0, 0.2646], [0.0, 2.5], [6.0, 41.0]]
+    >>> still = Refits(bounded(2.0, 0.04), [bounded(2.0, 0.04)] * 19)
+    >>> ends = intervals([Refits(still.truth, refits), still, still], np.array([2.5, 6.0]))
+    >>> np.round(ends["noise"], 4).tolist()
+    [0.0, 0.2646]
     >>> ends = intervals([Refits(bounded(2.0, 0.04), refits)], np.array([-2.5, 6.0]))
     >>> [np.round(ends[name], 4).tolist() for name in names[1:]]
     [[-36.0, 2.0], [6.0, 44.0]]

@@ -407,7 +407,8 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: BestFit | None)
     >>> f"{np.mean(np.log(measured / expected) ** 2) / fit.roughness:.6f}"
     '1.000000'
 
-    Without noise, the estimated variance may be negative by chance. The noise is then zero. If the noise is known, its variance is not estimated.
+    Without noise, the estimated variance may be negative by chance. The noise is then zero. If
+    the noise is known, its variance is not estimated.
 
     >>> rows = truth(1e-20).simulate(np.random.default_rng(4))
     >>> fit = _estimate(rows, setting, None)
