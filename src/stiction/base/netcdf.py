@@ -45,6 +45,24 @@ def read_netcdf(content: bytes, unwanted: Collection[str] = ()) -> xr.Dataset:
     """Return the numbers and texts at the root of a NetCDF file, without `unwanted` names.
 
     Raises an `InputError` that states why a file cannot be read.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> data = {"load": ("x", [3.0, 7.0]), "name": "first", "labels": ("x", ["a", "b"])}
+    >>> given = xr.Dataset(data, attrs={"title": "press"})
+    >>> read = read_netcdf(bytes(given.to_netcdf(engine="h5netcdf")))
+    >>> sorted(read.data_vars), read["load"].values.tolist(), read.attrs
+    (['labels', 'load'], [3.0, 7.0], {'title': 'press'})
+    >>> sorted(read_netcdf(bytes(given.to_netcdf(engine="h5netcdf")), ["load"]).data_vars)
+    ['labels']
+    >>> classic = bytes(given[["load"]].to_netcdf(engine="scipy", format="NETCDF3_CLASSIC"))
+    >>> classic[:3], read_netcdf(classic)["load"].values.tolist()
+    (b'CDF', [3.0, 7.0])
+    >>> read_netcdf(b"x (mm), y (mm)")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: is not a NetCDF file of numbers: ...
     """
     import h5py
     import xarray as xr
@@ -71,6 +89,20 @@ def _check(file: Any, content: bytes, unwanted: Collection[str]) -> list[str]:
 
     Returns the names at the root that hold neither numbers nor a list
     of texts.
+
+    Examples
+    --------
+    >>> import h5py
+    >>> with h5py.File(io.BytesIO(), "w") as file:
+    ...     file["load"], file["name"] = [3.0, 7.0], "first"
+    ...     file["labels"] = ["a", "b"]
+    ...     file["groups/slip"], file["texts"] = [1, 2], [["a", "b"]]
+    ...     print(_check(file, bytes(1000), ()))
+    ...     file["other"] = h5py.SoftLink("load")
+    ...     _check(file, bytes(1000), ())  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: 'other' is a link to another place. Copy the data into...
     """
     import h5py
 
@@ -110,12 +142,36 @@ def _check(file: Any, content: bytes, unwanted: Collection[str]) -> list[str]:
 
 
 def _check_letters(letters: int, content: bytes) -> None:
+    """Refuse texts that are longer than their file.
+
+    >>> _check_letters(3, b"abc")
+    >>> _check_letters(4, b"abc")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: texts need more memory than the whole file...
+    """
     if letters > len(content):
         raise InputError("texts need more memory than the whole file. Write the file again")
 
 
 def _letters_in_attributes(item: Any, content: bytes) -> int:
-    """Return the size of the attributes of an object. Texts are read one by one."""
+    """Return the size of the attributes of an object. Texts are read one by one.
+
+    >>> import h5py
+    >>> with h5py.File(io.BytesIO(), "w") as file:
+    ...     file.attrs.update({"title": "press", "axes": ["x", "load"], "range": [1.0, 7.0, 9.0]})
+    ...     print(_letters_in_attributes(file, bytes(13)))  # 5 + (1 + 4) + 3
+    ...     _letters_in_attributes(file, bytes(12))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: texts need more memory than the whole file...
+    >>> with h5py.File(io.BytesIO(), "w") as file:
+    ...     file.attrs["axes"] = ["x", "load"]
+    ...     _letters_in_attributes(file, range(MAX_FILE_BYTES // 2 + 1))  # as long as a large file
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: attribute 'axes' holds too many texts, 2. Delete it
+    """
     import h5py
 
     letters = 0
@@ -133,7 +189,14 @@ def _letters_in_attributes(item: Any, content: bytes) -> int:
 
 
 def _padded_size(dataset: Any) -> int:
-    """Return the number of values in all chunks, which may extend beyond the array."""
+    """Return the number of values in all chunks, which may extend beyond the array.
+
+    >>> from types import SimpleNamespace
+    >>> _padded_size(SimpleNamespace(shape=(7, 4), chunks=(3, 4)))  # 9 x 4
+    36
+    >>> [_padded_size(SimpleNamespace(shape=shape, chunks=None)) for shape in ((7, 4), (), None)]
+    [28, 1, 1]
+    """
     sizes = zip(dataset.shape or (), dataset.chunks or dataset.shape or (), strict=True)
     return math.prod(-(-size // chunk) * chunk for size, chunk in sizes)
 
@@ -142,6 +205,29 @@ def _check_chunks(dataset: Any, made: Any) -> None:
     """Refuse chunks that unpack to another size than their shape.
 
     HDF5 has no limit for this size.
+
+    A chunk may be stored without compression, or with a checksum of four bytes.
+
+    >>> import h5py
+    >>> def check(write=lambda item: None, **options):
+    ...     with h5py.File(io.BytesIO(), "w") as file:
+    ...         item = file.create_dataset("load", (6,), "f8", chunks=(4,), **options)
+    ...         item[:] = range(6)
+    ...         write(item)
+    ...         try:
+    ...             return _check_chunks(item, item.id.get_create_plist())
+    ...         except InputError as error:
+    ...             return str(error)
+    >>> check(compression="gzip", shuffle=True, fletcher32=True), check(shuffle=True)
+    (None, None)
+    >>> check(compression="lzf")
+    "'/load' is compressed by an unsupported filter. Compress it by zlib"
+    >>> [check(lambda item: item.id.write_direct_chunk((4,), zlib.compress(bytes(size))),
+    ...        compression="gzip") for size in (31, 32, 33)]
+    ["chunks of '/load' unpack to a wrong size", None, "chunks of '/load' unpack to a wrong size"]
+    >>> [check(lambda item: item.id.write_direct_chunk((0,), bytes(size), 1), compression="gzip")
+    ...  for size in (32, 36)]
+    [None, "chunks of '/load' unpack to a wrong size"]
     """
     filters = [made.get_filter(number)[0] for number in range(made.get_nfilters())]
     if not {*filters} <= {SHUFFLE, DEFLATE, CHECKSUM} or filters.count(DEFLATE) > 1:

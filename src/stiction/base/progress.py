@@ -35,7 +35,13 @@ exceptions."""
 
 
 def duration(seconds: float) -> str:
-    """Return seconds as text for people, such as '1.5 h'."""
+    """Return seconds as text for people, such as '1.5 h'.
+
+    >>> [duration(seconds) for seconds in (2.5e-4, 1e-3, 0.9994, 1.0, 119.0, 120.0)]
+    ['250 us', '1 ms', '999 ms', '1 s', '119 s', '2 min']
+    >>> [duration(seconds) for seconds in (7199.0, 7200.0, 172799.0, 172800.0, 1e6, 0.0)]
+    ['120 min', '2 h', '48 h', '2 days', '11.6 days', '0 us']
+    """
     sizes = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "days": 86400.0}
     most = {"us": 1e-3, "ms": 1.0, "s": 120.0, "min": 7200.0, "h": 172800.0}
     unit = next((unit for unit, below in most.items() if seconds < below), "days")
@@ -46,6 +52,28 @@ class Meter:
     """Context manager for the progress of a computation.
 
     `total` is its size, if known.
+
+    Examples
+    --------
+    >>> reported = []
+    >>> with Meter("solving", 7, lambda *counts: reported.append(counts)) as meter:
+    ...     meter.advance()
+    ...     meter.advance(3)
+    ...     meter.stage("sorting")
+    ...     meter.advance(2)
+    >>> reported, meter.what
+    ([(1, 7), (4, 7), (2, 0)], 'sorting')
+
+    After an interruption the next report ends the work.
+
+    >>> interrupted.set()
+    >>> try:
+    ...     meter.advance()
+    ... except KeyboardInterrupt:
+    ...     print(meter.done)
+    ... finally:
+    ...     interrupted.clear()
+    2
     """
 
     def __init__(
@@ -79,7 +107,26 @@ class Meter:
 
     @property
     def text(self) -> str:
-        """Return the progress, the elapsed and the remaining time, in words."""
+        """Return the progress, the elapsed and the remaining time, in words.
+
+        The pace is that between the first report and now: 12 s for 3 samples, and 5 are left.
+
+        >>> from unittest.mock import patch
+        >>> meter = Meter("solving", 1009, False)
+        >>> meter.done, meter._begun, meter._first, meter.note = 1004, 70.0, (100.0, 1001), "step 7"
+        >>> with patch("time.monotonic", return_value=112.9):
+        ...     print(meter.text)
+        ...     meter.done = 1009
+        ...     print(meter.text)
+        ...     meter.stage("sorting")
+        ...     print(meter.text)
+        ...     meter.unit, meter.done = "steps", 5
+        ...     print(meter.text)
+        1,004 of 1,009 samples, step 7, 42 s, about 22 s left
+        1,009 of 1,009 samples, step 7, 42 s
+        42 s
+        5 steps, 42 s
+        """
         of = f" of {self.total:,}" if self.total else ""
         parts = [f"{self.done:,}{of} {self.unit}" if self.done or of else "", self.note]
         parts.append(duration(math.floor(self.elapsed)))
@@ -92,6 +139,34 @@ class Meter:
         return ", ".join(part for part in parts if part)
 
     def __enter__(self) -> Meter:
+        """Show the meter if no other meter is shown.
+
+        >>> import io
+        >>> from contextlib import redirect_stderr
+        >>> from unittest.mock import patch
+        >>> log, now = io.StringIO(), [0.0]
+        >>> with redirect_stderr(log), patch("time.monotonic", lambda: now[0]):
+        ...     with patch("stiction.base.progress._display", return_value=None):
+        ...         with Meter("outer") as outer, Meter("inner", 8, unit="steps") as inner:
+        ...             for now[0] in (9.0, 10.0, 19.0, 20.5, 200.0, 209.0, 219.0, 221.0):
+        ...                 inner.advance()
+        ...             _running == [outer, inner]
+        ...         with Meter("short"), Meter("silent", 8, False) as silent:
+        ...             now[0] = 9999.0
+        ...             silent.advance()
+        ...     _running
+        True
+        []
+
+        A line comes after 10 s, and later when the time has grown by a tenth:
+
+        >>> print(log.getvalue(), end="")
+        inner: 2 of 8 steps, 10 s, about 6 s left
+        inner: 4 of 8 steps, 20 s, about 15 s left
+        inner: 5 of 8 steps, 3.33 min, about 2.38 min left
+        inner: 8 of 8 steps, 3.68 min
+        outer: 3.68 min
+        """
         self._begun, self._line_due = time.monotonic(), PIPE_INTERVAL
         if self._show is True:
             _running.append(self)
@@ -136,12 +211,39 @@ _running: list[Meter] = []
 
 
 def _shown() -> Meter:
-    """Return the outermost running meter whose total is known, or else the innermost meter."""
+    """Return the outermost running meter whose total is known, or else the innermost meter.
+
+    >>> meters = [Meter("outer"), Meter("middle", 7), Meter("inner", 5), Meter("innermost")]
+    >>> for shown in (meters, meters[:2], meters[:1], [meters[0], meters[3]]):
+    ...     _running[:0] = shown
+    ...     print(_shown().what)
+    ...     del _running[: len(shown)]
+    middle
+    middle
+    outer
+    innermost
+    """
     return next((meter for meter in _running if meter.total), _running[-1])
 
 
 def _display() -> Any:
-    """Return the display of a running meter between `start` and `stop`, or None for a pipe."""
+    """Return the display of a running meter between `start` and `stop`, or None for a pipe.
+
+    >>> import io
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import patch
+    >>> terminal = SimpleNamespace(isatty=lambda: True)
+    >>> hosts = (terminal, ()), (io.StringIO(), ("ipykernel",)), (None, ("ipykernel",)), (None, ())
+    >>> for stderr, modules in hosts:
+    ...     host = SimpleNamespace(stderr=stderr, modules=modules)
+    ...     with patch("stiction.base.progress.sys", host):
+    ...         with patch("stiction.base.progress._bar", return_value="bar"):
+    ...             print(_display() if stderr is terminal else type(_display()).__name__)
+    bar
+    _Output
+    _Output
+    NoneType
+    """
     with suppress(*GONE):
         if sys.stderr.isatty():
             return _bar()
@@ -149,7 +251,15 @@ def _display() -> Any:
 
 
 def _bar() -> Any:
-    """Return a bar that disappears at the end. Printed lines appear above the bar."""
+    """Return a bar that disappears at the end. Printed lines appear above the bar.
+
+    >>> _running.insert(0, Meter("solving", 7))
+    >>> row = _bar().get_renderable()
+    >>> del _running[0]
+    >>> what, bar, text = [next(iter(column.cells)) for column in row.columns]
+    >>> what, bar.total, bar.completed, bar.pulse, text
+    ('solving', 7, 0, False, '0 of 7 samples, 0 us')
+    """
     from rich.console import Console
     from rich.live import Live
     from rich.progress_bar import ProgressBar
@@ -166,7 +276,25 @@ def _bar() -> Any:
 
 
 class _Output:
-    """An output of a notebook, which is empty at the end. Rich would need ipywidgets."""
+    """An output of a notebook, which is empty at the end. Rich would need ipywidgets.
+
+    Examples
+    --------
+    >>> from unittest.mock import Mock, patch
+    >>> output, ipython = _Output(), Mock()
+    >>> output.stop()
+    >>> output._ended.is_set()
+    True
+    >>> output._ended = Mock(wait=Mock(side_effect=[False, True]))
+    >>> _running.insert(0, Meter("solving", 7))
+    >>> with patch.dict(sys.modules, {"IPython": ipython, "IPython.display": ipython}):
+    ...     output.start()
+    >>> del _running[0]
+    >>> for shown in ipython.display.return_value.update.call_args_list:
+    ...     print(shown.args[0], shown.kwargs)
+    {'text/plain': 'solving: 0 of 7 samples, 0 us'} {'raw': True}
+    {} {'raw': True}
+    """
 
     def __init__(self) -> None:
         self._ended = threading.Event()
