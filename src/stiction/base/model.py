@@ -59,7 +59,21 @@ SI_NUMBER = "must be a number in SI units, such as 4e3, or a quantity of pint or
 
 
 def as_number(value: Any) -> float:
-    """Return a number from any library as a float. Strings and Booleans are refused."""
+    """Return a number from any library as a float. Strings and Booleans are refused.
+
+    >>> as_number(np.array(3)), as_number(np.float32(0.5)), as_number(7)
+    (3.0, 0.5, 7.0)
+    >>> for given in ("4 km", True, np.array([1.0]), 1j, 10**400):
+    ...     try:
+    ...         as_number(given)
+    ...     except ValueError as error:
+    ...         print(error)
+    must be a number in SI units, such as 4e3, or a quantity of pint or astropy
+    must be a number
+    must be a number
+    must be a number
+    must be finite
+    """
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, str):
@@ -73,7 +87,15 @@ def as_number(value: Any) -> float:
 
 
 def _real(value: Any, info: pydantic.ValidationInfo) -> float:
-    """Return a number in SI. The name of the argument gives the unit for a quantity."""
+    """Return a number in SI. The name of the argument gives the unit for a quantity.
+
+    >>> from types import SimpleNamespace
+    >>> quantity = SimpleNamespace(magnitude=3, to=lambda text: {"m": 0.003, "": 5}[text])
+    >>> _real(quantity, SimpleNamespace(field_name="length"))
+    0.003
+    >>> _real(quantity, SimpleNamespace(field_name=None)), in_si(7, "length")
+    (5.0, 7)
+    """
     return as_number(in_si(value, info.field_name or ""))
 
 
@@ -86,7 +108,21 @@ def in_si(value: Any, name: str) -> Any:
 
 
 def as_count(value: Any) -> int:
-    """Return a whole number from any library, such as 1e4, as an int."""
+    """Return a whole number from any library, such as 1e4, as an int.
+
+    >>> as_count(1e4), as_count(np.int64(7)), as_count(np.float64(-3.0))
+    (10000, 7, -3)
+    >>> for given in (1.5, True, "3", np.inf, np.array(3)):
+    ...     try:
+    ...         as_count(given)
+    ...     except ValueError as error:
+    ...         print(error)
+    must be a whole number
+    must be a whole number
+    must be a whole number
+    must be a whole number
+    must be a whole number
+    """
     if isinstance(value, numbers.Integral) and not isinstance(value, bool):
         return int(value)
     if isinstance(value, bool | np.ndarray) or not is_finite(value) or value % 1:
@@ -95,21 +131,35 @@ def as_count(value: Any) -> int:
 
 
 def is_whole(value: Any, least: int) -> bool:
-    """Return whether a value is a whole number, such as 1e4, and not less than `least`."""
+    """Return whether a value is a whole number, such as 1e4, and not less than `least`.
+
+    >>> is_whole(3e0, 3), is_whole(2, 3), is_whole(3.5, 1), is_whole("3", 1)
+    (True, False, False, False)
+    """
     with suppress(ValueError):
         return as_count(value) >= least
     return False
 
 
 def is_finite(value: Any) -> bool:
-    """Return whether a value is a finite number, and not a string or a Boolean."""
+    """Return whether a value is a finite number, and not a string or a Boolean.
+
+    >>> [is_finite(value) for value in (3, np.float64(0.5), np.nan, -np.inf, "3", True, None)]
+    [True, True, False, False, False, False, False]
+    """
     with suppress(ValueError):
         return math.isfinite(as_number(value))
     return False
 
 
 def is_unplaced(value: Any) -> bool:
-    """Return whether a profile has coordinates or units, which its problem converts."""
+    """Return whether a profile has coordinates or units, which its problem converts.
+
+    >>> from types import SimpleNamespace
+    >>> given = {"dims": "x"}, {"to_xarray": None}, {"to_value": None, "unit": "m"}, {"unit": "m"}
+    >>> [is_unplaced(SimpleNamespace(**value)) for value in given]
+    [True, True, True, False]
+    """
     return is_quantity(value) or any(hasattr(value, name) for name in ("dims", "to_xarray"))
 
 
@@ -118,6 +168,33 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
 
     A study file may also give a path, or a table {file, ...} with
     options of the reader.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> info = SimpleNamespace(context=None, field_name="strength")
+    >>> given = np.array([3, 7])
+    >>> array = _profile(given, info)
+    >>> array.tolist(), array.flags.writeable, given.flags.writeable, _profile(np.array(5), info)
+    ([3.0, 7.0], False, True, 5.0)
+    >>> for value in ("4 cm", np.nan, [], [[[1.0]]], [1.0, np.nan], np.float64(np.inf), "a.csv"):
+    ...     try:
+    ...         _profile(value, info)
+    ...     except ValueError as error:
+    ...         print(error)
+    must be a number in SI units, such as 4e3, or a quantity of pint or astropy
+    must be finite
+    must have shape (nodes,) or (nx, ny), got shape (0,)
+    must have shape (nodes,) or (nx, ny), got shape (1, 1, 1)
+    must be finite. Entry 1 is not
+    must be finite
+    must be numbers, got str. Read files by st.read_profile(path) or st.read_peaks(path)
+
+    A study file may name a file:
+
+    >>> info.context = {"read": lambda value, name: [len(name), len(value)]}
+    >>> [_profile(value, info).tolist() for value in ("a.csv", {"file": "a.csv"})]
+    [[8.0, 5.0], [8.0, 1.0]]
     """
     read = (info.context or {}).get("read")
     if isinstance(value, str) and states_unit(value):
@@ -140,22 +217,54 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
 
 
 def _plain(value: Any) -> Any:
+    """Return arrays as lists.
+
+    >>> _plain(np.array([3.0, 7.0])), _plain("a.csv")
+    ([3.0, 7.0], 'a.csv')
+    """
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _flag(value: Any, words: str = "True or False") -> bool:
+    """Return a Boolean of Python or numpy.
+
+    >>> _flag(np.bool_(False)), _flag(True)
+    (False, True)
+    >>> _flag(1)
+    Traceback (most recent call last):
+        ...
+    ValueError: must be True or False
+    """
     if not isinstance(value, bool | np.bool_):
         raise ValueError(f"must be {words}")
     return bool(value)
 
 
 def _show(value: Any) -> Any:
+    """Return how progress is shown.
+
+    >>> _show(False), _show(print) is print
+    (False, True)
+    >>> _show(int)
+    Traceback (most recent call last):
+        ...
+    ValueError: must be True, False or a function of (done, total)
+    """
     if callable(value) and not isinstance(value, type):
         return value
     return _flag(value, "True, False or a function of (done, total)")
 
 
 def _names(value: Any) -> tuple[str, ...]:
+    """Return a name, or several, as a tuple.
+
+    >>> _names("slip"), _names(["slip", "load"]), _names({"load"}), _names(())
+    (('slip',), ('slip', 'load'), ('load',), ())
+    >>> _names(["slip", 3])
+    Traceback (most recent call last):
+        ...
+    ValueError: must be a name or a list of names
+    """
     names = tuple(value) if isinstance(value, list | tuple | set | frozenset) else (value,)
     if not all(isinstance(name, str) for name in names):
         raise ValueError("must be a name or a list of names")
@@ -163,6 +272,21 @@ def _names(value: Any) -> tuple[str, ...]:
 
 
 def _path(value: Any) -> Path:
+    r"""Return a path with usable names.
+
+    >>> _path("a" * 255) == Path("a" * 255), _path(Path("runs") / "a").name
+    (True, 'a')
+    >>> for given in ("a" * 256, "", 3, b"a", "C:\temp"):
+    ...     try:
+    ...         _path(given)
+    ...     except ValueError as error:
+    ...         print(str(error)[:42])
+    must be a path in UTF-8 with names of at m
+    must be a path in UTF-8 with names of at m
+    must be a path in UTF-8 with names of at m
+    must be a path in UTF-8 with names of at m
+    must be a path without tabs and line break
+    """
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
     usable = isinstance(text, str) and text != ""
     if usable and not text.isprintable():
@@ -236,7 +360,13 @@ Mode: TypeAlias = Literal["II", "III"]
 
 
 def describe(value: Any) -> str:
-    """Return a short form of a given value, for messages."""
+    """Return a short form of a given value, for messages.
+
+    >>> describe(np.zeros((3, 2))), describe([3, "a"])
+    ('an array of shape (3, 2)', "[3, 'a']")
+    >>> describe("a" * 58) == repr("a" * 58), describe("a" * 59) == "'" + "a" * 56 + "..."
+    (True, True)
+    """
     if isinstance(value, np.ndarray):
         return f"an array of shape {value.shape}"
     text = repr(value)
@@ -244,7 +374,17 @@ def describe(value: Any) -> str:
 
 
 def keys_of(cls: Any) -> list[str]:
-    """Return the keys for a model in a study file, which are the names of its fields."""
+    """Return the keys for a model in a study file, which are the names of its fields.
+
+    >>> @dataclasses.dataclass
+    ... class Line:
+    ...     instead_of_fields = ("span",)
+    ...     length: float
+    ...     nodes: int = 3
+    ...     area: float = dataclasses.field(init=False)
+    >>> keys_of(Line), valid_keys(Line), valid_keys(Line(2.0))
+    (['length', 'nodes'], ['length', 'nodes', 'span'], ['length', 'nodes', 'span'])
+    """
     return [field.name for field in dataclasses.fields(cls) if field.init]
 
 
@@ -265,6 +405,27 @@ def explain(
     The path in a message begins with `root`. `otherwise` replaces
     an empty path. A union has an item for each of its members.
     The texts of the members are joined by 'or'.
+
+    >>> def mistakes(given, annotation, **options):
+    ...     try:
+    ...         pydantic.TypeAdapter(annotation).validate_python(given)
+    ...     except pydantic.ValidationError as error:
+    ...         return explain(error, given, **options)
+    >>> mistakes({"a": [3, 0.5]}, dict[str, list[Count]], root="nodes")
+    ['nodes.a.1: must be a whole number, got 0.5']
+    >>> mistakes("c", int | Literal["a", "b"], otherwise="nodes")  # doctest: +ELLIPSIS
+    ["nodes: must be a valid integer, ... or 'a' or 'b', got 'c'"]
+    >>> @dataclasses.dataclass
+    ... class Pair:
+    ...     a: int
+    ...     b: InstanceOf[str]
+    >>> mistakes({"b": 5}, Pair)
+    ['a: missing', 'b: must be a str, got 5']
+    >>> mistakes(-3e-7, Annotated[float, Field(ge=0.00005)])
+    ['must be greater than or equal to 5e-05, got -3e-07']
+    >>> shown = mistakes([-1] * 103, list[Count])
+    >>> len(shown), shown[-2:]
+    (101, ['99: must be greater than or equal to 0, got -1', 'and 3 more'])
     """
     members: dict[tuple[str, str], dict[str, None]] = {}
     items = error.errors(include_url=False)
@@ -290,7 +451,16 @@ def explain(
 
 
 def _steps_into(given: Any, steps: Sequence[int | str], missing: bool) -> Iterator[str]:
-    """Yield the steps that lead into a value, without pydantic's steps into members of unions."""
+    """Yield the steps that lead into a value, without pydantic's steps into members of unions.
+
+    >>> given = {"a": [3, {"b": np.array([5])}]}
+    >>> list(_steps_into(given, ("a", "list[int]", 1, "b", 0), False))
+    ['a', '1', 'b', '0']
+    >>> [list(_steps_into(given, ("a", 1, "c"), missing)) for missing in (True, False)]
+    [['a', '1', 'c'], ['a', '1']]
+    >>> list(_steps_into(given, ("tag", "a", 2), True))
+    ['a', '2']
+    """
     for step in steps:
         given = given.tolist() if isinstance(given, np.ndarray) else given
         keys = range(len(given)) if isinstance(given, list | tuple) else given
@@ -305,6 +475,16 @@ def named(error: pydantic.ValidationError, valid: Sequence[str]) -> pydantic.Val
     """Return pydantic's error about a model or a call with the valid names.
 
     A missing name is not reported if a given name is a misspelling of it.
+
+    >>> @model
+    ... class Line:
+    ...     length: Positive
+    ...     nodes: Count
+    >>> Line(lenght=2)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: Line.nodes: missing
+    Line: unknown 'lenght'; did you mean 'length'? (valid: length, nodes)
     """
     mistakes: list[Any] = error.errors(include_url=False)
     misspelt = set()
@@ -325,7 +505,26 @@ def named(error: pydantic.ValidationError, valid: Sequence[str]) -> pydantic.Val
 
 
 class Door:
-    """A public call or constructor, where an `InputError` lists all mistakes in the arguments."""
+    """A public call or constructor, where an `InputError` lists all mistakes in the arguments.
+
+    Examples
+    --------
+    >>> door = Door("solve", inspect.signature(lambda x, *, y=5: None))
+    >>> door.names, door.by_place
+    (['x', 'y'], ['x'])
+    >>> door.call(dict, (3,), {"y": 7})
+    {'x': 3, 'y': 7}
+    >>> for args, kwargs in (((3, 7), {}), ((3,), {"x": 7})):
+    ...     try:
+    ...         door.call(dict, args, kwargs)
+    ...     except InputError as error:
+    ...         print(error)
+    solve: give the arguments by name (valid: x, y)
+    solve: give the arguments by name (valid: x, y)
+    >>> method = Door("solve", inspect.signature(lambda self, x: None))
+    >>> method.names, method.call(lambda *args, **given: (args, given), ("object", 3), {})
+    (['x'], (('object',), {'x': 3}))
+    """
 
     def __init__(self, owner: str, signature: inspect.Signature, root: str = "") -> None:
         parameters = signature.parameters.values()
@@ -364,7 +563,21 @@ def _named_keys(cls: Any, given: Any, handler: Callable[[Any], Any]) -> Any:
 
 
 class _Listing(ABCMeta):
-    """Type of `Listed`."""
+    """Type of `Listed`.
+
+    Examples
+    --------
+    >>> @dataclasses.dataclass
+    ... class Base(Listed):
+    ...     length: float = 2.0
+    ...     _shown = ("run",)
+    ...     def run(self): ...
+    ...     def prepare(self): ...
+    >>> class Study(Base):
+    ...     def sweep(self): ...
+    >>> dir(Base), dir(Study)
+    (['run'], ['run', 'sweep'])
+    """
 
     def __dir__(cls) -> list[str]:
         """Return the public names without internal members and without fields.
@@ -386,6 +599,32 @@ class Listed(metaclass=_Listing):
     """
 
     _shown: ClassVar[tuple[str, ...]]
+
+    """Examples
+    --------
+    >>> @model(kw_only=True)
+    ... class Line:
+    ...     length: Positive
+    ...     heights: RealArray = ()
+    >>> line = Line(length=2, heights=[3, 5])
+    >>> line, line == Line(length=2.0, heights=(3.0, 5.0)), line == Line(length=2)
+    (Line(length=2.0, heights=[3.0, 5.0]), True, False)
+    >>> print(inspect.signature(Line))
+    (*, length: float, heights: array = ()) -> None
+    >>> Line(length=-2, heights="a")
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: Line.length: must be greater than 0, got -2
+    Line.heights: must be numbers, got str
+    >>> Line(2.0)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: Line: give the arguments by name (valid: length, heights)
+    >>> line.length = 3.0
+    Traceback (most recent call last):
+        ...
+    dataclasses.FrozenInstanceError: cannot assign to field 'length'
+    """
 
 
 @typing.overload
@@ -434,6 +673,24 @@ def to_plain(value: Any) -> Any:
 
     Raises an `InputError` for parts that
     exist only in Python, such as a function.
+
+    >>> @model
+    ... class Law:
+    ...     rates: PlacedProfile
+    ...     slope: Any = None
+    >>> to_plain(Law([3, 5])), to_plain(Law(2, "x"))
+    ({'rates': [3.0, 5.0]}, {'rates': 2.0, 'slope': 'x'})
+    >>> from types import SimpleNamespace
+    >>> to_plain(SimpleNamespace(plain=lambda: 7))
+    7
+    >>> to_plain(Law(2, abs))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: Law: cannot be written down: Unable to serialize ...
+    >>> to_plain(SimpleNamespace())
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: SimpleNamespace: exists only in Python
     """
     if hasattr(value, "plain"):
         return value.plain()
@@ -454,6 +711,19 @@ def checked(function: Function) -> Function:
 
     A class in an annotation accepts only instances, not tables of a
     study file. An `InputError` lists all mistakes.
+
+    >>> @checked
+    ... def scaled(values: Sequence[float], *, factor: Positive = 2.0) -> float:
+    ...     return [factor * value for value in values]
+    >>> scaled([3, 5], factor=7), scaled([3.0])
+    ([21.0, 35.0], [6.0])
+    >>> print(inspect.signature(scaled))
+    (values: Sequence, *, factor: float = 2.0) -> float
+    >>> scaled([3], factor=-1, facto=3)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: factor: must be greater than 0, got -1
+    scaled: unknown 'facto'; did you mean 'factor'? (valid: values, factor)
     """
     written = function.__annotations__
     function.__annotations__ = {
@@ -483,7 +753,14 @@ class _Plain(str):
 
 
 def plain_name(hint: Any) -> str:
-    """Return an annotation in plain words: the text among its metadata, or else the type."""
+    """Return an annotation in plain words: the text among its metadata, or else the type.
+
+    >>> [plain_name(hint) for hint in (Positive, Names, FilePath, Mode, Progress, Count | None)]
+    ['float', 'tuple', 'Path', 'str', 'bool | Callable', 'int']
+    >>> hints = list[int], float | Real | str, Literal[3, "a", 4], "st.Study"
+    >>> [plain_name(hint) for hint in hints]
+    ['list', 'float | str', 'int | str', 'Study']
+    """
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     metadata = getattr(hint, "__metadata__", ())
     if metadata:
@@ -501,6 +778,10 @@ def plain_signature(owner: Any, hints: Mapping[str, Any]) -> inspect.Signature:
     """Return the signature of a function or class with plain annotations.
 
     The default shows whether an argument may be left out.
+
+    >>> def solve(self, x, y: Positive | None = None) -> Mode: ...
+    >>> print(plain_signature(solve, {"y": Positive | None}))
+    (self, x, y: float = None) -> str
     """
     signature = inspect.signature(owner)
     parameters = [
@@ -514,7 +795,18 @@ def plain_signature(owner: Any, hints: Mapping[str, Any]) -> inspect.Signature:
 
 
 def _instances(hint: Any) -> Any:
-    """Return the annotation with model classes that accept only instances."""
+    """Return the annotation with model classes that accept only instances.
+
+    >>> @dataclasses.dataclass
+    ... class Line:
+    ...     length: float
+    >>> [check("line", given, Line | None | float) for given in (Line(2.0), None, 3)]
+    [Line(length=2.0), None, 3.0]
+    >>> check("line", {"length": 2.0}, Line | None)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: line: must be a Line, got {'length': 2.0}
+    """
     if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
         return functools.reduce(operator.or_, map(_instances, typing.get_args(hint)))
     is_model = dataclasses.is_dataclass(hint)
@@ -526,6 +818,13 @@ def check(name: str, value: Any, annotation: Any) -> Any:
 
     Use this for values that `checked` does
     not see, such as entries of a mapping.
+
+    >>> check("nodes", 3.0, Count), check("names", "slip", Names)
+    (3, ('slip',))
+    >>> check("title", 3, str)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: title: must be a str, got 3
     """
     try:
         return _adapter(annotation).validate_python(value)
@@ -541,7 +840,19 @@ def _adapter(annotation: Any) -> pydantic.TypeAdapter[Any]:
 
 
 def check_memory(name: str, needed: float, advice: str = "Take fewer") -> None:
-    """Raise an `InputError` if arrays need more memory (bytes) than this machine has."""
+    """Raise an `InputError` if arrays need more memory (bytes) than this machine has.
+
+    >>> from unittest.mock import patch
+    >>> pages = {"SC_PHYS_PAGES": 3 * 2**17, "SC_PAGE_SIZE": 2**12}  # 1.5 GiB
+    >>> with patch("os.sysconf", pages.__getitem__, create=True):
+    ...     check_memory("nodes", 1.5 * 2**30)
+    ...     check_memory("nodes", 2000 * 2**30)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction...: nodes: would take 2,000.0 GiB of memory, more than the 1.5 GiB ... Take fewer
+    >>> with patch("os.sysconf", side_effect=ValueError, create=True):
+    ...     check_memory("nodes", 2000 * 2**30)
+    """
     try:
         there = float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):  # unknown on this system
