@@ -38,6 +38,23 @@ similar times."""
 
 
 def _part(value: Any) -> tuple[int, int]:
+    r"""Return the number of a part, and the number of parts.
+
+    >>> _part("3/100"), _part("5/5"), _part("1/1")
+    ((3, 100), (5, 5), (1, 1))
+    >>> for given in ("0/5", "6/5", "3", "3/100 ", "-1/5", "\u0663/5", 3):
+    ...     try:
+    ...         _part(given)
+    ...     except ValueError as error:
+    ...         print(str(error)[:31])
+    must be K/N with K from 1 to N,
+    must be K/N with K from 1 to N,
+    must be K/N with K from 1 to N,
+    must be K/N with K from 1 to N,
+    must be K/N with K from 1 to N,
+    must be K/N with K from 1 to N,
+    must be K/N with K from 1 to N,
+    """
     match = re.fullmatch(r"(\d+)/(\d+)", value, re.ASCII) if isinstance(value, str) else None
     number, of = map(int, match.groups()) if match else (0, 0)
     if not 1 <= number <= of:
@@ -53,6 +70,15 @@ def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray
     """Return a mask (points, samples) of the samples in a part.
 
     Blocks go to the parts in turn.
+
+    A part of 50 // 3 samples has eight blocks of 2 samples, or blocks of at most 256 samples.
+
+    >>> [np.flatnonzero(samples_of_part((k, 3), 2, 25)).tolist()[:6] for k in (1, 2, 3)]
+    [[0, 1, 6, 7, 12, 13], [2, 3, 8, 9, 14, 15], [4, 5, 10, 11, 16, 17]]
+    >>> samples_of_part((2, 3), 2, 5).astype(int).tolist()
+    [[0, 1, 0, 0, 1], [0, 0, 1, 0, 0]]
+    >>> np.flatnonzero(samples_of_part((2, 2), 1, 10_000))[[0, 255, 256]].tolist()
+    [256, 511, 768]
     """
     (number, of), total = part, points * samples
     block = min(SAMPLES_PER_BLOCK, max(1, total // (FEWEST_BLOCKS * of)))
@@ -77,7 +103,12 @@ class Status(Result):
 
     @property
     def complete(self) -> bool:
-        """Whether every sample is stored."""
+        """Whether every sample is stored.
+
+        >>> status = Status(7, 6, np.array([6]), (), (), 1, 2.5, ())
+        >>> status.complete, Status(7, 7, *list(vars(status).values())[2:]).complete
+        (False, True)
+        """
         return self.done == self.samples
 
 
@@ -88,6 +119,43 @@ class StoredRun:
     ----------
     path : Path
     study : Study
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=576)
+    >>> random = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> sweep = [{"random.strength.spectrum.correlation_length": [3e-3, 6e-3]}]
+    >>> study = st.Study(
+    ...     problem=problem, random=random, method=st.LocalCriterion(), samples=3, sweep=sweep
+    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     part = study.run(out=folder, part="2/4", progress=False)
+    ...     run = st.open_run(folder)
+    ...     repr(run).removeprefix(f"StoredRun({folder!r}")
+    ...     state = run.status()
+    ...     state.samples, state.done, state.done_by_point.tolist(), state.complete, state.failures
+    ...     run.dataset(["critical_load"]).critical_load.isnull().values.astype(int).tolist()
+    ...     try:
+    ...         run.export(Path(folder, "all.csv"))
+    ...     except RunError as error:
+    ...         str(error).removeprefix(folder)[:26]
+    ...     run.export(Path(folder, "all.nc"), partial=True)
+    ...     run.export(Path(folder, "all.csv"), partial=True)
+    ...     Path(folder, "all.csv").read_text()[:40], Path(folder, "all.nc").exists()
+    ...     for events in (False, True):
+    ...         try:
+    ...             run.export("all.nc" if events else "all.txt", partial=True, events=events)
+    ...         except InputError as error:
+    ...             print(error)
+    ', 2 x 3 samples by local criterion)'
+    (6, 2, [1, 1], False, ())
+    [[1, 0, 1], [1, 1, 0]]
+    ': 2 of 6 samples exist. Ru'
+    ('correlation_length (m),sample (1),critic', True)
+    all.txt: the suffix must be .nc or .csv, got '.txt'
+    all.nc: the suffix must be .csv for a table of events, got '.nc'
     """
 
     def __init__(self, store: Store, study: Any) -> None:
@@ -195,7 +263,29 @@ class StoredRun:
 
 
 def write_result(result: xr.Dataset, path: Path) -> None:
-    """Write a result as a NetCDF file with checksums, completely or not at all."""
+    """Write a result as a NetCDF file with checksums, completely or not at all.
+
+    >>> import tempfile
+    >>> from unittest.mock import patch
+    >>> import h5py
+    >>> import xarray as xr
+    >>> slip = "x", [2.5, 7.5]
+    >>> result = xr.Dataset({"slip": slip, "name": ("x", ["a", "b"]), "load": 3.0}, {"x": slip})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "result.nc")
+    ...     write_result(result, path)
+    ...     with h5py.File(path) as file:
+    ...         print({name: file[name].fletcher32 for name in sorted(file)})
+    ...     for free in (1.05 * result.nbytes + OVERHEAD, 1.05 * result.nbytes + OVERHEAD - 1):
+    ...         with patch("shutil.disk_usage") as usage:
+    ...             usage.return_value.free = free
+    ...             try:
+    ...                 write_result(result, path)
+    ...             except RunError as error:
+    ...                 print(usage.call_args.args == (path.parent,), os.strerror(28) in str(error))
+    {'load': False, 'name': False, 'slip': True, 'x': True}
+    True True
+    """
     with suppress(OSError):
         free = shutil.disk_usage(path.parent).free
         # NetCDF does not report a full disk,
@@ -276,6 +366,23 @@ def table_of(result: xr.Dataset) -> pd.DataFrame:
     Columns, named ``name (unit)``, hold swept keys, the sample number
     and results. Curves of equally likely interfaces are left out, but
     their band is included.
+
+    >>> import xarray as xr
+    >>> from stiction.base.errors import collect_warnings
+    >>> cells = {
+    ...     "load": ("sample", [3.0, 7.0], {"units": "Pa"}),
+    ...     "place": (("sample", DIRECTION), [[1.0, 2.0], [5.0, 6.0]], {"units": "m"}),
+    ...     "slip": (("sample", "x"), [[1.0, 2.0], [5.0, 6.0]]),
+    ...     "curve": ("member", [1.0, 2.0, 4.0]),
+    ... }
+    >>> coords = {"sample": [0, 1], DIRECTION: ["x", "y"], "member": [0, 1, 2]}
+    >>> result = xr.Dataset(cells, coords)
+    >>> with collect_warnings() as caught:
+    ...     table = table_of(result)
+    >>> table.columns.tolist(), table.values.tolist()[1]
+    (['sample (1)', 'load (Pa)', 'place_x (m)', 'place_y (m)'], [1.0, 7.0, 5.0, 6.0])
+    >>> caught[0].text[:36]
+    'slip: has several numbers for each s'
     """
     result = result.drop_dims("member", errors="ignore")
     wide = sorted(
@@ -293,7 +400,14 @@ def table_of(result: xr.Dataset) -> pd.DataFrame:
 
 
 def components(result: xr.Dataset) -> xr.Dataset:
-    """Return a result with a variable such as critical_position_x for each component."""
+    """Return a result with a variable such as critical_position_x for each component.
+
+    >>> import xarray as xr
+    >>> place = xr.DataArray([3.0, 7.0], {DIRECTION: ["x", "y"]}, attrs={"units": "m"})
+    >>> parts = components(xr.Dataset({"place": place, "load": 5.0}))
+    >>> {str(name): float(part) for name, part in parts.items()}, parts.place_y.attrs
+    ({'load': 5.0, 'place_x': 3.0, 'place_y': 7.0}, {'units': 'm'})
+    """
     for name, values in result.data_vars.items():
         if DIRECTION in values.dims:
             parts = {
@@ -305,7 +419,17 @@ def components(result: xr.Dataset) -> xr.Dataset:
 
 
 def _frame_of(result: xr.Dataset) -> pd.DataFrame:
-    """Return a column for each variable or component, named ``name (unit)``."""
+    """Return a column for each variable or component, named ``name (unit)``.
+
+    The rows follow the dimensions of the variables. A dimension without a variable is dropped.
+
+    >>> import xarray as xr
+    >>> load = xr.DataArray([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], dims=("point", "sample"))
+    >>> coords = {"mean": ("point", [0.1, 0.2], {"units": "Pa"}), "x": [1.0, 2.0]}
+    >>> frame = _frame_of(xr.Dataset({"load": load}, coords))
+    >>> frame.columns.tolist(), frame.values.tolist()[4]
+    (['mean (Pa)', 'point (1)', 'sample (1)', 'load (1)'], [0.2, 1.0, 1.0, 5.0])
+    """
     narrow = components(result)
     rows = list(dict.fromkeys(dim for v in narrow.data_vars.values() for dim in v.dims))
     narrow = narrow.drop_dims({*narrow.dims} - {*rows})
