@@ -344,6 +344,29 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     >>> result = st.monte_carlo(problem, field, method=method, samples=20, seed=1)
     >>> list(st.external.event_table(result).columns[:3])
     ['sample (1)', 'event (1)', 'event_load (Pa)']
+
+    Events are kept with NaN for missing events:
+
+    >>> import xarray as xr
+    >>> from stiction.base.errors import collect_warnings
+    >>> event = ("sample", "event")
+    >>> cells = {"event_load": (event, [[3.0, np.nan], [5.0, 7.0]], {"units": "Pa"})}
+    >>> cells |= {"arrested_events": ("sample", [1, 2]), "critical_load": ("sample", [8.0, 9.0])}
+    >>> with collect_warnings() as caught:
+    ...     table = event_table(xr.Dataset(cells))
+    ...     cells["arrested_events"] = "sample", [1, 4]
+    ...     _ = event_table(xr.Dataset(cells))
+    >>> print(table.to_csv(index=False), end="")
+    sample (1),event (1),event_load (Pa)
+    0,0,3.0
+    1,0,5.0
+    1,1,7.0
+    >>> [warned.text for warned in caught]
+    ['events: kept only 2 of up to 4 per sample. Raise events=']
+    >>> event_table(xr.Dataset({"critical_load": 3.0}))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: result: has no events. Set events= of the method, ...
     """
     variables = getattr(result, "data_vars", {})
     names = [str(name) for name, values in variables.items() if "event" in values.dims]

@@ -80,6 +80,12 @@ More are in a file next to it.
 
 
 def _method(given: Any) -> Any:
+    """Return a method. A table goes to the class that its type names.
+
+    >>> import stiction as st
+    >>> _method({"type": "equilibrium"}), _method(st.LocalCriterion())
+    (NotImplemented, LocalCriterion())
+    """
     return NotImplemented if isinstance(given, dict) else as_method(given)
 
 
@@ -88,6 +94,13 @@ MethodOfStudy: Any = Annotated[Any, OneOf(METHODS, _method), "Method"]
 
 
 def _interface(given: Any) -> Any:
+    """Return a random interface. A field becomes the strength of an interface.
+
+    >>> import stiction as st
+    >>> field = st.paper.strength(st.paper.problem(nodes=576))
+    >>> _interface(field) == st.RandomInterface(strength=field), _interface("other")
+    (True, 'other')
+    """
     return as_random_interface(given) if isinstance(given, RandomField) else given
 
 
@@ -95,7 +108,15 @@ _Interface: Any = Annotated[RandomInterface, BeforeValidator(_interface)]
 
 
 def _interfaces(given: Any, info: pydantic.ValidationInfo) -> Any:
-    """Return the interfaces from a fit or a posterior. Return other values unchanged."""
+    """Return the interfaces from a fit or a posterior. Return other values unchanged.
+
+    >>> from types import SimpleNamespace
+    >>> fit = SimpleNamespace(interfaces=lambda count, seed: (count == FIRST_MEMBERS, seed))
+    >>> [_interfaces(fit, SimpleNamespace(data=data)) for data in ({"seed": 7}, {})]
+    [(True, 7), (True, 0)]
+    >>> _interfaces("other", SimpleNamespace(data={}))
+    'other'
+    """
     seed = info.data.get("seed", 0)
     return given.interfaces(FIRST_MEMBERS, seed) if isinstance(given, Source) else given
 
@@ -114,6 +135,16 @@ def _profiles_of(given: Any, info: pydantic.ValidationInfo) -> Any:
     """Return profiles.
 
     In a study file, a profile may be a file or a table {file, ...}.
+
+    >>> from types import SimpleNamespace
+    >>> read = lambda value, name: f"{name} from {value}"
+    >>> info, given = SimpleNamespace(context={"read": read}), {"slip": "a.csv", "strength": [3.0]}
+    >>> _profiles_of(given, info), _profiles_of([3.0], info)
+    ({'slip': 'slip from a.csv', 'strength': [3.0]}, [3.0])
+    >>> _profiles_of(given, SimpleNamespace(context=None)) is given
+    True
+    >>> _profiles_of({"slip": {"file": "a.csv"}}, info)
+    {'slip': "slip from {'file': 'a.csv'}"}
     """
     read = (info.context or {}).get("read")
     if not isinstance(given, Mapping) or read is None:
@@ -130,6 +161,17 @@ def _peaks_of(given: Any) -> Any:
     """Return peaks.
 
     A study in plain form holds them as a table {unit, values, lengths}.
+
+    >>> table = {"unit": "N", "values": [[3e3, 5e3, 4e3], [7e3, 8e3]], "lengths": [0.1, 0.25]}
+    >>> peaks = _peaks_of(table)
+    >>> peaks.lengths, [values.tolist() for values in peaks.values], peaks.unit
+    ((0.1, 0.25), [[3000.0, 5000.0, 4000.0], [7000.0, 8000.0]], 'N')
+    >>> _plain_peaks(peaks) == table
+    True
+    >>> _plain_peaks(_peaks_of({"unit": "Pa", "values": [[3e6, 5e6, 4e6, 7e6]]}))
+    {'unit': 'Pa', 'values': [[3000000.0, 5000000.0, 4000000.0, 7000000.0]]}
+    >>> _peaks_of(peaks) is peaks
+    True
     """
     if not isinstance(given, Mapping) or "values" not in given:
         return make_peaks(given)
@@ -161,6 +203,19 @@ class Question:
         `stiction.design_stress`.
     target_cv : float
         Coefficient of variation to reach.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> Question(force=620, target_cv=0.2)
+    Question(force=620.0, target_cv=0.2)
+    >>> for given in ({}, {"force": 620, "probability": 0.05}):
+    ...     try:
+    ...         Question(**given)
+    ...     except st.InputError as error:
+    ...         print(str(error).rpartition(", ")[2])
+    got nothing
+    got force and probability
     """
 
     stress: Positive | None = None
@@ -196,7 +251,20 @@ class Question:
             raise InputError(f"method: {slow}")
 
     def answer(self, experiment: Experiment, workers: int | None = None) -> Answer:
-        """Answer the question for a point of a study."""
+        """Answer the question for a point of a study.
+
+        >>> from types import SimpleNamespace
+        >>> from unittest.mock import patch
+        >>> point = SimpleNamespace(problem="problem", random="random", method="method", seed=7)
+        >>> with patch("stiction.study.study.failure_probability") as answer:
+        ...     _ = Question(force=620, target_cv=0.2).answer(point, 3)
+        >>> answer.call_args
+        call('problem', 'random', force=620.0, target_cv=0.2, method='method', workers=3, seed=7)
+        >>> with patch("stiction.study.study.design_stress") as answer:
+        ...     _ = Question(probability=0.05).answer(point)
+        >>> answer.call_args.args, answer.call_args.kwargs["sensitivities"]
+        (('problem', 'random'), True)
+        """
         options = self._given | {"method": experiment.method, "workers": workers}
         options["seed"] = experiment.seed
         if self.probability is None:
@@ -207,7 +275,15 @@ class Question:
 
 @model(kw_only=True)
 class _Parts(Listed):
-    """The parts of a study at a sweep point. Each part is valid by itself."""
+    """The parts of a study at a sweep point. Each part is valid by itself.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=576)
+    >>> _Parts(problem=problem, method={"type": "local_criterion"}).method
+    LocalCriterion()
+    """
 
     problem: Problem
     seed: Number = 0  # before the random properties, which a source draws with it
@@ -284,7 +360,23 @@ class Study(_Parts):
         return self
 
     def _place_profiles(self) -> None:
-        """Read the profiles, and hold them as plain values at the nodes, in SI."""
+        """Read the profiles, and hold them as plain values at the nodes, in SI.
+
+        >>> import stiction as st
+        >>> given = {"problem": st.paper.problem(nodes=576), "method": st.LocalCriterion()}
+        >>> profiles = {"strength": np.linspace(1e6, 2e6, 576)}
+        >>> Study(**given, profiles=profiles).profiles["strength"][::575]
+        [1000000.0, 2000000.0]
+        >>> Study(**given, profiles=profiles, samples=3, reliability={"stress": 1.0})
+        Traceback (most recent call last):
+            ...
+        stiction.base.errors.InputError: Study: reliability: has no effect on given profiles
+        Study: samples: must be 1, because profiles are given
+        >>> Study(**given)
+        Traceback (most recent call last):
+            ...
+        stiction.base.errors.InputError: Study: random: give either random properties or profiles
+        """
         unused = [f"{name}: has no effect on given profiles" for name in ("reliability", "peaks")
                   if getattr(self, name) is not None]  # fmt: skip
         if self.samples > 1:
@@ -304,9 +396,19 @@ class Study(_Parts):
 
     @property
     def points(self) -> list[Point]:
-        """The sweep points, in order.
+        r"""The sweep points, in order.
 
         Without a sweep, there is one point without values.
+
+        >>> from types import SimpleNamespace
+        >>> sweep = [{"random.a": [0.25, 0.5], "random.b": [3, 4]}, {"seed": [7, 9]}]
+        >>> print(*Study.points.fget(SimpleNamespace(sweep=sweep)), sep="\n")
+        point 0 (random.a = 0.25, random.b = 3, seed = 7)
+        point 1 (random.a = 0.25, random.b = 3, seed = 9)
+        point 2 (random.a = 0.5, random.b = 4, seed = 7)
+        point 3 (random.a = 0.5, random.b = 4, seed = 9)
+        >>> Study.points.fget(SimpleNamespace(sweep=[]))
+        [Point(number=0, values={})]
         """
         keys = [key for axis in self.sweep for key in axis]
         steps = itertools.product(*(zip(*axis.values(), strict=True) for axis in self.sweep))
@@ -351,7 +453,31 @@ class Study(_Parts):
 
     @property
     def axes(self) -> GridAxes:
-        """The sweep axes as dimensions of the result."""
+        """The sweep axes as dimensions of the result.
+
+        >>> import stiction as st
+        >>> problem = st.paper.problem(nodes=576)
+        >>> given = {"problem": problem, "random": st.paper.strength(problem)}
+        >>> length = "random.strength.spectrum.correlation_length"
+        >>> sweep = [{length: [0.02, 0.03], "problem.interface.length": [0.2, 0.1]}]
+        >>> sweep += [{"seed": [7, 9]}]
+        >>> study = Study(**given, method=st.LocalCriterion(), sweep=sweep)
+        >>> {dim: list(coordinates) for dim, coordinates in study.axes.items()}
+        {'correlation_length': ['correlation_length', 'length'], 'seed': ['seed']}
+        >>> points = study.experiments
+        >>> [(point.problem.interface.length, point.seed) for point in points]
+        [(0.2, 7), (0.2, 9), (0.1, 7), (0.1, 9)]
+        >>> points[0].problem is points[1].problem, points[2].problem == problem
+        (True, True)
+        >>> strengths = [point.random.properties["strength"] for point in points]
+        >>> [field.spectrum.correlation_length for field in strengths], study.attributes["seed"]
+        ([0.02, 0.02, 0.03, 0.03], 0)
+        >>> sweep = [{length: [0.02, -3.0]}, {"seed": [7, 9]}]
+        >>> Study(**given, method=st.LocalCriterion(), sweep=sweep)  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+            ...
+        stiction...: Study: ...: must be greater than 0, got -3.0, at point 2 (...) of the sweep
+        """
         taken = {*variables_in(self.experiments), "sample", "x", "y"}
         fields = {} if self.profiles else self.experiments[0].random.properties
         coefficients = [name for name, field in fields.items() if field.quantity]
@@ -359,7 +485,17 @@ class Study(_Parts):
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Attributes for a result. The study can be run again from these attributes."""
+        """Attributes for a result. The study can be run again from these attributes.
+
+        >>> from types import SimpleNamespace
+        >>> study = SimpleNamespace(to_dict=lambda: {"samples": 3}, title="first", seed=7)
+        >>> Study.attributes.fget(study)
+        {'study': {'samples': 3}, 'seed': 7, 'title': 'first'}
+        >>> def refuse():
+        ...     raise InputError("Law: exists only in Python")
+        >>> Study.attributes.fget(SimpleNamespace(to_dict=refuse, title="", seed=7))
+        {'study_incomplete': 'Law: exists only in Python', 'seed': 7}
+        """
         try:
             attributes: dict[str, Any] = {"study": self.to_dict()}
         except InputError as error:  # a function of the user's: the result states it
@@ -423,7 +559,27 @@ class Study(_Parts):
         return {name: value for name, value in plain if value or name not in left_out}
 
     def to_toml(self, path: str | Path) -> None:
-        """Write the study to a TOML file. Many interfaces are written to a JSON file next to it."""
+        """Write the study to a TOML file. Many interfaces are written to a JSON file next to it.
+
+        >>> import tempfile
+        >>> import stiction as st
+        >>> problem = st.paper.problem(nodes=576)
+        >>> given = {"problem": problem, "method": st.LocalCriterion(), "title": "many"}
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     for count in (8, 9):
+        ...         study = Study(random=[st.paper.strength(problem)] * count, **given)
+        ...         study.to_toml(Path(folder, f"study{count}.toml"))
+        ...         Study.from_toml(Path(folder, f"study{count}.toml")) == study
+        ...     sorted(path.name for path in Path(folder).iterdir())
+        ...     [path.name for path in read_with_files(Path(folder, "study9.toml"))[1]]
+        True
+        True
+        ['study8.toml', 'study9.random.json', 'study9.toml']
+        ['study9.random.json']
+        >>> plain = study.to_dict()
+        >>> list(plain), list(Study.from_dict(plain | {"title": ""}).to_dict())[-1]
+        (['problem', 'seed', 'random', 'method', 'samples', 'title'], 'samples')
+        """
         plain, place = self.to_dict(), check("path", path, FilePath)
         beside = place.with_suffix(".random.json")
         interfaces = plain["random"]
@@ -463,7 +619,23 @@ class Study(_Parts):
 
 
 def _check_toml(content: bytes) -> None:
-    """Refuse text that Python's parser would read slowly, such as keys with a thousand parts."""
+    r"""Refuse text that Python's parser would read slowly, such as keys with a thousand parts.
+
+    >>> _check_toml(b"a" + b".b" * 64 + b" = 1\n# " + b"." * 65 + b"\nx = [" + b"1.5, " * 99 + b"]")
+    >>> for line in (b"a" + b".b" * 65, b"x = " + b"1." * 65, b"a" * (MAX_TOML_WORDS + 1)):
+    ...     try:
+    ...         _check_toml(b"a = 1\n" + line)
+    ...     except InputError as error:
+    ...         print(str(error)[:41])
+    has a line with over 64 dots apart from n
+    has a line with over 64 dots apart from n
+    has more than 2097152 bytes, or 262144 ou
+    >>> _check_toml(b"a = [" + b"1, " * MAX_TOML_WORDS + b"]")
+    >>> _check_toml(b"1, " * MAX_TOML_BYTES)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: has more than 2097152 bytes, or 262144 outside lists...
+    """
     words = 0
     for line in content.split(b"\n"):
         match = _NUMBERS.fullmatch(line)
@@ -480,7 +652,26 @@ def _check_toml(content: bytes) -> None:
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
-    """Return the tables in a TOML file, or raise an `InputError`."""
+    r"""Return the tables in a TOML file, or raise an `InputError`.
+
+    >>> import tempfile
+    >>> def read(content):
+    ...     with tempfile.TemporaryDirectory() as folder:
+    ...         path = Path(folder, "study.toml")
+    ...         path.write_bytes(content)
+    ...         try:
+    ...             return _read_toml(path)
+    ...         except InputError as error:
+    ...             return str(error).removeprefix(f"{path}: ")
+    >>> [read("a = 'é'".encode(code))["a"] for code in ("utf-8", "utf-8-sig", "utf-16")]
+    ['é', 'é', 'é']
+    >>> read(b"a = \xff")
+    'is not UTF-8 (byte 4). Save it as UTF-8'
+    >>> read(b"a = ")[:23], read(b"a = ")[-40:]
+    ('is not valid TOML: Inva', '(`stiction example FILE` writes a study)')
+    >>> read(rb'a = "C:\peaks.csv"')[-55:]
+    '(in paths, write / for \\, or put them in single quotes)'
+    """
     content = content_of(path)
     wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))  # of PowerShell 5.1
     with prefixed(str(path)):
@@ -503,6 +694,23 @@ def _validated(given: dict[str, Any], folder: Path | None, files: list[Path]) ->
 
     Files that the study names are in `folder`, and their paths are
     appended to `files`.
+
+    >>> _validated({str(number): 0 for number in range(12)}, None, [])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction...: study: must have the tables problem, random, method, got '0', '1', ..., '9'. `...
+    >>> _validated({"title": "first"}, None, [])
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: problem: missing
+    method: missing
+    >>> files = []
+    >>> _validated({"peaks": "peaks.csv"}, Path("no folder"), files)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: peaks: ...: does not exist
+    >>> files == [Path("no folder", "peaks.csv")]
+    True
     """
     check("study", given, dict)
     if given and not {*keys_of(Study)} & {*given}:
@@ -534,7 +742,20 @@ def _validated(given: dict[str, Any], folder: Path | None, files: list[Path]) ->
 
 
 def _stored_interfaces(path: Path) -> list[Any]:
-    """Return the interfaces in a file that `Study.to_toml` wrote."""
+    """Return the interfaces in a file that `Study.to_toml` wrote.
+
+    >>> import tempfile
+    >>> def read(content):
+    ...     with tempfile.TemporaryDirectory() as folder:
+    ...         path = Path(folder, "study.random.json")
+    ...         path.write_text(content)
+    ...         try:
+    ...             return _stored_interfaces(path)
+    ...         except InputError as error:
+    ...             return str(error).removeprefix(f"{path}: ")
+    >>> read("[3, 5]"), read("{}"), read("[3")[:18]
+    ([3, 5], 'interfaces: must be a list, got {}', 'is not valid JSON:')
+    """
     with prefixed(str(path)):
         content = content_of(path)
         try:
@@ -570,6 +791,18 @@ def open_run(path: Any) -> StoredRun:
     StoreError
         If the folder holds no run, or if its study cannot be read, for
         example because it names a class that is not installed.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "study.toml")
+    ...     path.touch()
+    ...     try:
+    ...         open_run(path)
+    ...     except InputError as error:
+    ...         print(str(error).replace(str(path), "PATH"))
+    path: PATH is a file. Give the folder of the run
     """
     place = check("path", path, FilePath)
     if place.is_file():

@@ -35,7 +35,19 @@ _announced: set[str] = set()
 
 
 def _foreign_classes(kind: Any) -> set[Any]:
-    """Return the classes from outside the package that are named in numba types."""
+    """Return the classes from outside the package that are named in numba types.
+
+    >>> from types import SimpleNamespace
+    >>> class Law:
+    ...     __module__ = "mylaws"
+    >>> class Ours:
+    ...     __module__ = "stiction.problem.friction.laws"
+    >>> foreign, ours = (SimpleNamespace(instance_class=kind) for kind in (Law, Ours))
+    >>> [name.__name__ for name in _foreign_classes((ours, [SimpleNamespace(types=[foreign])]))]
+    ['Law']
+    >>> _foreign_classes([ours, SimpleNamespace()])
+    set()
+    """
     kinds = kind if isinstance(kind, tuple | list) else getattr(kind, "types", ())
     classes: set[Any] = set().union(*map(_foreign_classes, kinds))
     named = getattr(kind, "instance_class", None)
@@ -49,6 +61,20 @@ def _parts(value: Any) -> Iterator[str]:
 
     A TypeError says that the function names something else, which may
     change without being noticed.
+
+    >>> list(_parts((3, ("a", None), 2.5, np))), list(_parts(math))
+    (['3', "'a'", 'None', '2.5', 'numpy'], ['math'])
+    >>> def law(limit):
+    ...     return lambda slip, rate=0.125: math.exp(-slip) * limit + rate
+    >>> parts = list(_parts(law(7)))
+    >>> [part in parts for part in ("exp", "math", "0.125", "7", "8")]
+    [True, True, True, True, False]
+    >>> list(_parts(numba.njit(law(7)))) == parts, list(_parts(law(8))) == parts
+    (True, False)
+    >>> list(_parts([3]))
+    Traceback (most recent call last):
+        ...
+    TypeError: <class 'list'>
     """
     value = getattr(value, "py_func", value)
     if isinstance(value, tuple):
@@ -68,7 +94,22 @@ def _parts(value: Any) -> Iterator[str]:
 
 
 def _state_of(classes: Iterable[Any]) -> str | None:
-    """Return a digest of external friction laws, or None if the laws may change unnoticed."""
+    """Return a digest of external friction laws, or None if the laws may change unnoticed.
+
+    >>> class Law:
+    ...     f = staticmethod(lambda slip: 2.0 * slip)
+    >>> class Steep(Law):
+    ...     f = staticmethod(lambda slip: 3.0 * slip)
+    >>> states = [_state_of(laws) for laws in ([Law], [Steep], [Law, Steep])]
+    >>> len({*states}), _state_of([Steep, Law]) == states[2], len(states[0])
+    (3, True, 64)
+    >>> Steep.f = staticmethod(lambda slip: [slip])
+    >>> _state_of([Steep]) is None, _state_of([int]) is None  # int has no f
+    (False, True)
+    >>> Steep.__qualname__ = "f.<locals>.Steep"
+    >>> _state_of([Law, Steep]) is None
+    True
+    """
     state = hashlib.sha256()
     for law in sorted(classes, key=str):
         try:
@@ -87,6 +128,33 @@ class _Guard:
     An external law is part of the kernels that are compiled for the
     law. Numba would not notice that the law was edited, and could not
     read the index of its cache if the law's module is missing.
+
+    Examples
+    --------
+    Compiled code for a law that may change unnoticed is not kept:
+
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import Mock, patch
+    >>> cache = Mock(load_overload=Mock(return_value="compiled"))
+    >>> guard = _Guard(cache, _compile)
+    >>> guard._part, guard.load_overload((), "cpu"), guard.path is cache.path
+    (['jit'], 'compiled', True)
+    >>> class Law:
+    ...     __module__ = "mylaws"
+    >>> signature = (SimpleNamespace(instance_class=Law),)
+    >>> with patch("stiction.base.jit.decorators._announce") as announce:
+    ...     guard.load_overload(signature, "cpu"), guard.save_overload(signature, "data")
+    ...     guard.save_overload((), "data")
+    (None, None)
+    >>> announce.call_args.args, cache.save_overload.call_args_list
+    ((['jit'], False), [call((), 'data')])
+    >>> Law.f = staticmethod(lambda slip: 2.0 * slip)
+    >>> with patch("stiction.base.jit.decorators.internals") as kept:
+    ...     kept.Cache.return_value.load_overload.return_value = "compiled for the law"
+    ...     guard.load_overload(signature, "cpu"), guard.load_overload(signature, "cpu")
+    ('compiled for the law', 'compiled for the law')
+    >>> kept.Cache.call_count, kept.Cache.call_args.args == (_compile, _state_of([Law]))
+    (1, True)
     """
 
     def __init__(self, cache: Any, function: Callable[..., Any]) -> None:
@@ -124,7 +192,17 @@ class _Guard:
 
 
 def _announce(part: list[str], kept: bool) -> None:
-    """State once for each part of the package that its kernels are being compiled."""
+    """State once for each part of the package that its kernels are being compiled.
+
+    >>> from unittest.mock import patch
+    >>> with patch.object(logger, "log") as log:
+    ...     for kept in (True, True, False):
+    ...         _announce(["example"], kept)
+    >>> texts = [call.args[2] for call in log.call_args_list]
+    >>> texts
+    ['example (on first use only, then cached)', 'example (for your friction law; not cached)']
+    >>> _announced.difference_update(texts)
+    """
     when = "on first use only, then cached" if kept else "for your friction law; not cached"
     for text in {f"{name} ({when})" for name in part} - _announced:
         _announced.add(text)

@@ -43,6 +43,18 @@ class _Locator(_CacheLocator):
 
     Another environment with the same package
     therefore compiles nothing again.
+
+    Examples
+    --------
+    >>> def kernel():
+    ...     return 0.0
+    >>> locator = _Locator.from_function(kernel, __file__)
+    >>> locator.get_source_stamp() == hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+    True
+    >>> locator.get_disambiguator(), Path(locator.get_cache_path()).name
+    ('1', 'stiction.base.jit.internals')
+    >>> _Locator.from_function(kernel, "no such file") is None
+    True
     """
 
     def __init__(self, function: Any, file: str) -> None:
@@ -100,6 +112,15 @@ class _Flags(Flags):
     """Options of a compilation.
 
     Only options that were set are compared, but numba compares all.
+
+    Examples
+    --------
+    >>> _Flags().values(), "nrt" in Flags().values()
+    ({}, True)
+    >>> flags = _Flags()
+    >>> flags.nrt = True
+    >>> flags.values()
+    {'nrt': True}
     """
 
     def values(self) -> dict[str, Any]:
