@@ -1,6 +1,54 @@
-"""The command line: parse, call, print.
+r"""The command line: parse, call, print.
 
 Commands import numerics late, so that help is quick. Public names are imported on first use.
+
+Examples
+--------
+Commands are functions. This study has six samples, and the second of three jobs computes two.
+
+>>> import contextlib, tempfile
+>>> from unittest.mock import patch
+>>> problem = st.paper.problem(nodes=576)
+>>> strength = st.paper.strength(problem, correlation_ratio=2.0)
+>>> sweep = [{"seed": [7, 9]}]
+>>> study = st.Study(
+...     problem=problem, random=strength, method=st.LocalCriterion(), samples=3, sweep=sweep,
+...     title="first",
+... )
+>>> def show(command, *arguments, **options):
+...     try:
+...         command(*arguments, **options)
+...     except typer.Exit as ended:
+...         print("exit code", ended.exit_code)
+>>> file, out = Path("study.toml"), Path("run")
+>>> with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+...     study.to_toml(file)
+...     with patch("signal.signal"), contextlib.redirect_stdout(io.StringIO()) as printed:
+...         show(run, file, out, part="2/3")
+...     printed.getvalue().splitlines()[4:]  # after a table
+...     show(status, out)
+...     show(export, out, Path("all.csv"), partial=True)
+...     with contextlib.redirect_stderr(io.StringIO()) as printed:
+...         show(report, out)
+...     printed.getvalue(), sorted(path.name for path in out.glob("*.html"))
+...     try:
+...         example(file)
+...     except InputError as error:
+...         print(error)  # doctest: +ELLIPSIS
+['part 2/3: 2 of 6 samples in run']
+run: first
+  samples     2 of 6 (33.3 %)
+  chunks      ...
+  computed    ... of one core
+  point 0 (seed = 7): 1 of 3
+  point 1 (seed = 9): 1 of 3
+  undamaged   all stored chunks match their checksums
+exit code 1
+2 of 6 samples written to all.csv; the others are missing
+report: run...report.html
+exit code 1
+('the report shows 2 of 6 samples\n', ['report.html'])
+study.toml: already exists. Choose another name
 """
 
 import functools
@@ -53,11 +101,36 @@ COMPARED_SAMPLES = 1_000
 
 
 def echo(text: Any = "", *, err: bool = False) -> None:
-    """Print text that may come from a file. Escape characters that control a terminal."""
+    r"""Print text that may come from a file. Escape characters that control a terminal.
+
+    >>> echo("slip \x1b[2J")
+    slip \x1b[2J
+    """
     typer.echo(printable(str(text)), err=err)
 
 
 def _show_some(texts: Sequence[Any], prefix: str, *, err: bool = False) -> None:
+    """Print the first texts, and how many are left out.
+
+    >>> _show_some(range(7, 19), "- ")
+    - 7
+    - 8
+    - 9
+    - 10
+    - 11
+    - 12
+    - 13
+    - 14
+    - 15
+    - 16
+    - 17
+    - 18
+    >>> _show_some(["a"] * 14, "- ")  # doctest: +ELLIPSIS
+    - a
+    ...
+    - a
+    - and 2 more
+    """
     for text in texts[:MAX_SHOWN_LINES]:
         echo(f"{prefix}{text}", err=err)
     if len(texts) > MAX_SHOWN_LINES:
@@ -68,6 +141,16 @@ def _show_some(texts: Sequence[Any], prefix: str, *, err: bool = False) -> None:
 
 
 def _interrupt(*_: object) -> None:
+    """End the run, even if the exception of this handler is lost.
+
+    >>> try:
+    ...     _interrupt(15, None)
+    ... except KeyboardInterrupt:
+    ...     print(interrupted.is_set())
+    ... finally:
+    ...     interrupted.clear()
+    True
+    """
     interrupted.set()
     raise KeyboardInterrupt
 
@@ -81,7 +164,24 @@ def _report_nothing(lost: object) -> None:
 
 @contextmanager
 def _resumable(out: Path) -> Iterator[None]:
-    """Let an interruption end a run as Ctrl-C does, so that stored results are kept."""
+    """Let an interruption end a run as Ctrl-C does, so that stored results are kept.
+
+    >>> import tempfile
+    >>> from contextlib import redirect_stderr
+    >>> from unittest.mock import patch
+    >>> log = io.StringIO()
+    >>> with tempfile.TemporaryDirectory() as folder, redirect_stderr(log), patch("signal.signal"):
+    ...     with suppress(typer.Exit), _resumable(Path(folder)):
+    ...         interrupted.set()  # the exception of the signal was lost
+    ...     Path(folder, "chunks").mkdir()
+    ...     Path(folder, "chunks", "0.npz").touch()
+    ...     with suppress(typer.Exit), _resumable(Path(folder)):
+    ...         raise KeyboardInterrupt
+    >>> print(log.getvalue().replace(folder, "RUN"), interrupted.is_set())
+    interrupted: no sample is stored in RUN. Rerun the command to resume
+    interrupted: results are in RUN. Rerun the command to resume
+     False
+    """
     report: Callable[[Any], Any] = sys.unraisablehook
     # Python drops an exception in a callback from C and prints it. The run ends all the same.
     sys.unraisablehook = lambda lost: interrupted.is_set() or report(lost)
@@ -104,7 +204,18 @@ def _resumable(out: Path) -> Iterator[None]:
 
 @contextmanager
 def _executor(scheduler: str | None) -> Iterator[Any]:
-    """Yield the executor for a Dask scheduler, or None."""
+    """Yield the executor for a Dask scheduler, or None.
+
+    >>> from unittest.mock import patch
+    >>> with _executor(None) as executor:
+    ...     print(executor)
+    None
+    >>> with patch.dict(sys.modules, distributed=None):  # doctest: +ELLIPSIS
+    ...     _executor("tls://host").__enter__()
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: --scheduler: tls://host cannot be reached: ...
+    """
     if scheduler is None:
         yield None
         return
@@ -296,7 +407,27 @@ def check(study: StudyFile) -> None:
 
 
 def description(study: Any) -> dict[str, str]:
-    """Return a description of a study in a few titled lines."""
+    """Return a description of a study in a few titled lines.
+
+    >>> import numpy as np
+    >>> from types import SimpleNamespace
+    >>> from stiction.base.variables import Variable
+    >>> methods = [SimpleNamespace(label=label) for label in ("local", "exact", "local")]
+    >>> points = [SimpleNamespace(method=method) for method in methods]
+    >>> mean = np.array([2.0, 3.0, 7.0]), Variable("Pa", "strength.mean", ("mean",))
+    >>> nodes = np.array([64, 96, 128]), Variable("1", "nodes", ("mean",))
+    >>> axes = {"mean": {"nodes": nodes, "mean": mean}, "nodes": {"nodes": nodes}}
+    >>> study = SimpleNamespace(experiments=points, samples=5, seed=11, sweep=[1], axes=axes)
+    >>> description(study)["samples"], description(study)["method"]
+    ('5 (seed 11) at each of 3 points: 15 in total', 'local, exact')
+    >>> description(study)["axis 1"]
+    'nodes with strength.mean: 3 values, 2.0 to 7.0 Pa'
+    >>> description(study)["axis 2"]
+    'nodes: 3 values, 64 to 128'
+    >>> study.sweep, study.axes = [], {}
+    >>> description(study)
+    {'method': 'local, exact', 'samples': '5 (seed 11)'}
+    """
     points = study.experiments
     samples = f"{study.samples} (seed {study.seed})"
     if study.sweep:
@@ -313,7 +444,22 @@ def description(study: Any) -> dict[str, str]:
 
 
 def _cost(study: Any) -> dict[str, str]:
-    """Return the computing time for a study, from a few samples, and the size of its result."""
+    r"""Return the computing time for a study, from a few samples, and the size of its result.
+
+    Of seven points, five are timed. Ratios between them are interpolated in logarithms:
+    4 between 2 and 8, and 4 between 8 and 2. The sum is 29.
+
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import patch
+    >>> times = (0.5, 1.0, None, 4.0, 4.0, None, 1.0)
+    >>> points = [SimpleNamespace(seconds=0.5, sample_bytes=3e5, time=time) for time in times]
+    >>> study = SimpleNamespace(experiments=points, samples=10)
+    >>> with patch("stiction.cli.commands._seconds", lambda point: point.time):
+    ...     with patch("stiction.ensemble.batches.usable_cores", return_value=4):
+    ...         print(*_cost(study).values(), sep="\n")
+    about 2.42 min on one core, 36.2 s on 4 (500 ms to 4 s a sample, measured on a few samples)
+    about 21 MB
+    """
     import numpy as np
 
     from stiction.ensemble.batches import usable_cores
@@ -338,6 +484,23 @@ def _seconds(point: Any) -> float:
 
     The size of batches doubles until a batch takes long enough. Each
     batch runs twice, because kernels compile in its first run.
+
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import patch
+    >>> def timed(spent, estimate, batch=6):
+    ...     counts, clock = [], iter([time for end in spent for time in (0.0, end)])
+    ...     results = lambda first, count: counts.append(count)
+    ...     with patch("time.thread_time", lambda: next(clock)):
+    ...         point = SimpleNamespace(seconds=estimate, batch=batch, results=results)
+    ...         return round(_seconds(point), 6), counts
+    >>> timed([0.05, 0.06, 0.2], 0.001), timed([0.05, 0.06, 0.07, 0.09], 0.001)
+    ((0.05, [1, 1, 2, 2, 4, 4]), (0.015, [1, 1, 2, 2, 4, 4, 6, 6]))
+    >>> timed([0.05], 0.2), timed([], 3.0), timed([0.0], 0.001, 1)
+    ((0.05, [1, 1]), (3.0, []), (0.0, [1, 1]))
+    >>> def fail(first, count):
+    ...     raise RuntimeError
+    >>> _seconds(SimpleNamespace(seconds=0.25, batch=6, results=fail))
+    0.25
     """
     seconds, count = point.seconds, 1
     with suppress(InputError, RuntimeError, ArithmeticError), collect_warnings():
@@ -415,6 +578,13 @@ app = typer.Typer(
 
 
 def _print_version(wanted: bool) -> None:
+    """Print the version, and end.
+
+    >>> _print_version(False)
+    >>> with suppress(typer.Exit):
+    ...     _print_version(True)  # doctest: +ELLIPSIS
+    stiction ...
+    """
     if wanted:
         echo(f"stiction {st.__version__}")
         raise typer.Exit
@@ -430,7 +600,26 @@ def _options(
 
 
 def _command(function: Callable[..., None]) -> Callable[..., None]:
-    """Print warnings as lines. After Ctrl-C the exit code is 130, as shells expect."""
+    """Print warnings as lines. After Ctrl-C the exit code is 130, as shells expect.
+
+    >>> from contextlib import redirect_stderr
+    >>> from unittest.mock import patch
+    >>> @_command
+    ... def solve(nodes):
+    ...     warnings.warn(f"few nodes, {nodes}")
+    ...     raise KeyboardInterrupt
+    >>> log = io.StringIO()
+    >>> with redirect_stderr(log), patch("warnings.showwarning"), warnings.catch_warnings():
+    ...     warnings.simplefilter("always")
+    ...     try:
+    ...         solve(7)
+    ...     except typer.Exit as ended:
+    ...         print(ended.exit_code)
+    130
+    >>> print(log.getvalue(), end="")
+    warning: few nodes, 7
+    interrupted
+    """
 
     def show(message: Warning | str, *args: Any, **kwargs: Any) -> None:
         echo(f"warning: {message}", err=True)
@@ -452,9 +641,26 @@ for _function in (example, check, run, status, export, report, reliability):
 
 
 def main() -> None:
-    """Run the command line. Invalid input or a full disk gives a message, not a traceback.
+    r"""Run the command line. Invalid input or a full disk gives a message, not a traceback.
 
     The exit code is 2 for invalid input and 1 for failures of the run.
+
+    Examples
+    --------
+    >>> from contextlib import redirect_stderr
+    >>> from unittest.mock import patch
+    >>> def ended(error):
+    ...     log = io.StringIO()
+    ...     with redirect_stderr(log), patch.dict(os.environ), patch("logging.basicConfig"):
+    ...         with patch("stiction.cli.commands.app", side_effect=error):
+    ...             try:
+    ...                 main()
+    ...             except SystemExit as end:
+    ...                 return end.code, log.getvalue()
+    >>> ended(InputError(["nodes: missing", "width: missing"]))
+    (2, 'error: nodes: missing\nerror: width: missing\n')
+    >>> ended(RunError("no room")), ended(MemoryError()), ended(None)
+    ((1, 'error: no room\n'), (1, 'error: not enough memory\n'), None)
     """
     os.environ["MPLBACKEND"] = "Agg"  # figures are files, also in the shell of a notebook
     for stream in (sys.stdout, sys.stderr):

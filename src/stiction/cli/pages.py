@@ -45,7 +45,26 @@ terminal may print a page."""
 
 @dataclass
 class Page:
-    """Text, figures, tables and listings in the order in which they are added."""
+    r"""Text, figures, tables and listings in the order in which they are added.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> page = Page("Design of A & B")
+    >>> page.text("Slip \x1b[2J, <b>.", warning=True)
+    >>> page.table("Loads", ["name", "load"], [["first", 1234567], ["second", None]])
+    >>> page.listing("Study", "samples = 3")
+    >>> page.figure(Figure(figsize=(0.1, 0.1)), "No curve.")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     page.write(Path(folder, "page.html"))
+    ...     html = Path(folder, "page.html").read_text("utf-8")
+    >>> print([part["kind"] for part in page.parts], ascii(page.parts[1]["rows"]), sep="\n")
+    ['text', 'table', 'listing', 'figure']
+    [['first', '1,234,567'], ['second', '\u2013']]
+    >>> parts = "A &amp; B", "Slip \ufffd[2J, &lt;b&gt;", "1,234,567", "samples = 3"
+    >>> [part in html for part in parts], "data:image/png;base64,iVBOR" in html, "\x1b" in html
+    ([True, True, True, True], True, False)
+    """
 
     title: str
     parts: list[dict[str, Any]] = field(default_factory=list)
@@ -84,7 +103,15 @@ class Page:
 
 
 def shown(entry: Any) -> str:
-    """Return a table entry as text: numbers with five digits, or a dash for a missing value."""
+    r"""Return a table entry as text: numbers with five digits, or a dash for a missing value.
+
+    >>> {shown(entry) for entry in (None, np.nan, np.float32("nan"))} == {"\N{EN DASH}"}
+    True
+    >>> [shown(entry) for entry in (1234567, np.int64(-1000), True, np.float32(0.5), "a")]
+    ['1,234,567', '-1,000', 'True', '0.5', 'a']
+    >>> print(ascii([shown(-1234.5678), shown(2e-7)]))
+    ['\u22121234.6', '2e\u221207']
+    """
     if entry is None or (isinstance(entry, float | np.floating) and np.isnan(entry)):
         return "\N{EN DASH}"
     if isinstance(entry, int | np.integer) and not isinstance(entry, bool):
@@ -130,7 +157,15 @@ def write_report(run: StoredRun, path: Path) -> None:
 
 
 def densities(result: xr.Dataset) -> Figure:
-    """Return a figure with densities of the onset and of its position."""
+    """Return a figure with densities of the onset and of its position.
+
+    >>> rng = np.random.default_rng(7)
+    >>> units = {"critical_stress": "Pa", "critical_position": "m"}
+    >>> cells = {key: ("sample", rng.random(9), {"units": unit}) for key, unit in units.items()}
+    >>> figure = densities(xr.Dataset(cells))
+    >>> [axes.get_title(loc="left") for axes in figure.axes], figure.axes[0].get_legend()
+    (['(a)', '(b)'], None)
+    """
     parts = components(result[[shown_quantity(result), "critical_position"]])
     figure = Figure(figsize=(PAGE, 2.6))
     panels = figure.subplots(1, len(parts.data_vars))
@@ -143,7 +178,42 @@ def densities(result: xr.Dataset) -> Figure:
 
 
 def tables_of(result: xr.Dataset, axes: GridAxes) -> Iterator[tuple[str, pd.DataFrame]]:
-    """Yield tables of the onset at every point of a sweep: its statistics, or a single sample."""
+    r"""Yield tables of the onset at every point of a sweep: its statistics, or a single sample.
+
+    >>> axes = {"seed": {"seed": ()}, "length": {"length": ()}}
+    >>> def data(stresses, first):
+    ...     dims, attributes = ("seed", "length", "sample"), {"units": "Pa", "long_name": "stress"}
+    ...     cells = {"critical_stress": (dims, 1e6 * stresses, attributes)}
+    ...     cells["first_instability"] = dims, 1e6 * first, attributes | {"long_name": "first"}
+    ...     cells["critical_position"] = dims, first, {"units": "m"}
+    ...     length = "length", [0.2, 0.4], {"units": "m"}
+    ...     return xr.Dataset(cells, {"seed": [7], "length": length})
+    >>> stresses = np.array([[[1.0, 3.0, np.inf], [5.0, 5.0, 8.0]]])
+    >>> [title for title, frame in tables_of(data(stresses, stresses), axes)]
+    ['Stress']
+    >>> (title, frame), second = tables_of(data(stresses, 2.0 * stresses), axes)
+    >>> print(frame.round(3).T.to_string(header=False))
+    seed                        7.000    7.000
+    length (mm)               200.000  400.000
+    samples                     2.000    3.000
+    mean (MPa)                  2.000    6.000
+    standard error (MPa)        1.000    1.000
+    standard deviation (MPa)    1.414    1.732
+    5 % quantile (MPa)          1.100    5.000
+    50 % quantile (MPa)         2.000    5.000
+    95 % quantile (MPa)         2.900    7.700
+    >>> title, second[0]
+    ('Stress', 'First')
+    >>> [(title, frame)] = tables_of(data(stresses[..., :1], stresses[..., :1]), axes)
+    >>> print(title, *frame.columns, frame.values.tolist()[1], sep="\n")
+    Onset
+    seed
+    length (mm)
+    critical stress (MPa)
+    first instability (MPa)
+    critical position (m)
+    [7.0, 400.0, 5.0, 5.0, 5.0]
+    """
     dims, points = list(axes), {}
     flat = result.stack(point=dims) if dims else result.expand_dims("point")
     for key in (name for coordinates in axes.values() for name in coordinates):
@@ -233,7 +303,17 @@ def write_design(
 
 
 def _slip_tests(peaks: Any) -> Iterator[list[str]]:
-    """Yield the rows for the table of slip loads, in the words of EN 1090-2."""
+    """Yield the rows for the table of slip loads, in the words of EN 1090-2.
+
+    >>> from types import SimpleNamespace
+    >>> values = [np.array([0.5, 0.25]), np.array([0.4])]
+    >>> peaks = SimpleNamespace(values=values, specimens=(), normal_forces=(), surfaces=2)
+    >>> list(_slip_tests(peaks))[1:]
+    [['2', 'nan N', 'nan N', '0.25'], ['1', 'nan N', 'nan N', '0.4']]
+    >>> peaks.specimens, peaks.normal_forces = [["a", "b"], ["c"]], [[2e3, 8e3], [5e3]]
+    >>> list(_slip_tests(peaks))
+    [['a', '2 kN', '2 kN', '0.5'], ['b', '8 kN', '4 kN', '0.25'], ['c', '5 kN', '4 kN', '0.4']]
+    """
     for kind, factors in enumerate(peaks.values):
         names = peaks.specimens[kind] if peaks.specimens else range(1, factors.size + 1)
         forces = peaks.normal_forces[kind] if peaks.normal_forces else np.nan * factors
@@ -243,7 +323,21 @@ def _slip_tests(peaks: Any) -> Iterator[list[str]]:
 
 
 def _inputs(problem: Problem, sources: Mapping[str, str]) -> Iterator[list[Any]]:
-    """Yield the constants of a problem by dotted key, with units and sources."""
+    """Yield the constants of a problem by dotted key, with units and sources.
+
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=576)
+    >>> sources = {"solid.shear_modulus": "tension test", "interface.length": "drawing"}
+    >>> inputs = {key: rest for key, *rest in _inputs(problem, sources)}
+    >>> [inputs[key][1:] for key in ("solid.youngs_modulus", "solid.shear_modulus")]
+    [['Pa', 'tension test'], ['Pa', 'tension test']]
+    >>> [inputs[key][1:] for key in ("interface.length", "solid.poisson_ratio", "solid.density")]
+    [['m', 'drawing'], ['', 'assumed'], ['kg m-3', 'assumed']]
+    >>> list(_inputs(problem, {"solid.mass": "scale"}))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: sources: 'solid.mass' is not an input of this problem. The...
+    """
     # Young's modulus is shown with the shear modulus, which is stored, and has the same source.
     plain = to_plain(problem)
     plain["solid"]["youngs_modulus"] = problem.solid.youngs_modulus
