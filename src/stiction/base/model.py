@@ -779,9 +779,9 @@ def plain_signature(owner: Any, hints: Mapping[str, Any]) -> inspect.Signature:
 
     The default shows whether an argument may be left out.
 
-    >>> def solve(self, x, y: Positive | None = None) -> Mode: ...
+    >>> def solve(self, x, y: Positive | None = 7.5) -> Mode: ...
     >>> print(plain_signature(solve, {"y": Positive | None}))
-    (self, x, y: float = None) -> str
+    (self, x, y: float = 7.5) -> str
     """
     signature = inspect.signature(owner)
     parameters = [

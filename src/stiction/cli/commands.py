@@ -659,8 +659,8 @@ def main() -> None:
     ...                 return end.code, log.getvalue()
     >>> ended(InputError(["nodes: missing", "width: missing"]))
     (2, 'error: nodes: missing\nerror: width: missing\n')
-    >>> ended(RunError("no room")), ended(MemoryError()), ended(None)
-    ((1, 'error: no room\n'), (1, 'error: not enough memory\n'), None)
+    >>> ended(RunError("no room")), ended(MemoryError()), ended(None) is None
+    ((1, 'error: no room\n'), (1, 'error: not enough memory\n'), True)
     """
     os.environ["MPLBACKEND"] = "Agg"  # figures are files, also in the shell of a notebook
     for stream in (sys.stdout, sys.stderr):

@@ -163,8 +163,8 @@ def densities(result: xr.Dataset) -> Figure:
     >>> units = {"critical_stress": "Pa", "critical_position": "m"}
     >>> cells = {key: ("sample", rng.random(9), {"units": unit}) for key, unit in units.items()}
     >>> figure = densities(xr.Dataset(cells))
-    >>> [axes.get_title(loc="left") for axes in figure.axes], figure.axes[0].get_legend()
-    (['(a)', '(b)'], None)
+    >>> [axes.get_title(loc="left") for axes in figure.axes], figure.axes[0].get_legend() is None
+    (['(a)', '(b)'], True)
     """
     parts = components(result[[shown_quantity(result), "critical_position"]])
     figure = Figure(figsize=(PAGE, 2.6))
