@@ -69,6 +69,19 @@ LOAD_RTOL = 1e-9
 
 
 def _check_loads(loads: Any) -> Array:
+    """Return loads as an array, or raise an error.
+
+    >>> _check_loads(0.5).tolist(), _check_loads([0.0, 2.0]).tolist()
+    ([0.5], [0.0, 2.0])
+    >>> for loads in ([2.0, 2.0], [-1.0, 3.0], [1.0, np.inf]):
+    ...     try:
+    ...         print(_check_loads(loads))
+    ...     except InputError as error:
+    ...         print(str(error)[:43])
+    loads: must be finite, non-negative and inc
+    loads: must be finite, non-negative and inc
+    loads: must be finite, non-negative and inc
+    """
     given = np.atleast_1d(check("loads", loads, RealArray))
     # `prepend` also refuses a negative first load.
     rises = given.ndim == 1 and given.size and np.all(np.diff(given, prepend=-1e-300) > 0.0)
@@ -81,7 +94,36 @@ def _check_loads(loads: Any) -> Array:
 def _states_at(
     search: EquilibriumSearch, sample: StaticSample, path: SamplePath, loads: Array
 ) -> Iterator[EquilibriumState]:
-    """Yield the equilibrium at each of the rising loads, until the interface slides."""
+    """Yield the equilibrium at each of the rising loads, until the interface slides.
+
+    Events begin at 3 and 5 Pa, and end in states with the slip 3 and 5 m. The
+    search returns 10 times the slip from which it starts, plus 1 m. It finds no
+    equilibrium at 3 Pa, where the state with 0.2 m is about to jump:
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.methods.equilibrium.events import ArrestedEvent
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> sample = make_sample(np.full(2, 0.5), *np.ones((3, 2)), LINEAR)
+    >>> def state(load, slip):
+    ...     return EquilibriumState(load, np.full(2, slip), np.zeros(2))
+    >>> def at(sample, start, load):
+    ...     return state(load, 10.0 * start.slip[0] + 1.0) if load not in missing else None
+    >>> search, missing = SimpleNamespace(at=at), [3.0]
+    >>> events = [ArrestedEvent(state(load, 0.2), state(load, load)) for load in (3.0, 5.0)]
+    >>> path = SamplePath(events[0].before, state(5.5, 0.1), 5.5, events, True, None)
+    >>> def slips(loads, path):
+    ...     return [float(found.slip[0]) for found in _states_at(search, sample, path, loads)]
+    >>> slips([1.0, 2.0, 3.0, 4.0, 5.5, 6.0], path)
+    [1.0, 11.0, 0.2, 31.0, 51.0]
+
+    At 4 Pa an equilibrium is missing without an event nearby. An interface that
+    ends creeps on after its last event:
+
+    >>> missing.append(4.0)
+    >>> last = ArrestedEvent(state(5.5, 0.1), state(5.5, 7.0))
+    >>> slips([1.0, 4.0, 4.5], path), slips([6.0], path._replace(sliding=last))
+    ([1.0], [71.0])
+    """
     events = path.all_events
     starts = [at_rest(sample), *(event.after for event in events)]
     # Each state begins where the state before ended, because a path
@@ -220,7 +262,38 @@ def equilibrium_path(
 
 
 def _at_loads(problem: Problem, rows: Sample, given: Array, method: Any) -> dict[str, Array]:
-    """Return values at rising loads, Pa."""
+    """Return values at rising loads, Pa.
+
+    A search that is made by hand: an event at 1 MPa, sliding at 2 MPa, and the slip
+    of each equilibrium is 1 pm/Pa at every node. K d is replaced by 5 GPa/m times d:
+
+    >>> from types import SimpleNamespace
+    >>> import stiction as st
+    >>> from stiction.methods.equilibrium.state import Jump, Outcome, PathStatus
+    >>> from stiction.methods.equilibrium.strength import LINEAR
+    >>> solid, law = st.Solid(3e9, 0.35, 1180.0), st.LinearWeakening(1e9)
+    >>> problem = st.Problem(solid, st.Interface(0.8, 8), law)
+    >>> rows = problem.sample(np.linspace(3e6, 4e6, 8))
+    >>> def state(load, status=PathStatus.UNSTABLE):
+    ...     return EquilibriumState(load, np.full(8, 1e-12 * load), np.ones(8), status=status)
+    >>> names = "duration", "time", "radiated_energy", "settled"
+    >>> known = {f"event_{name}": 7.0 for name in names}
+    >>> rest = Jump(Outcome.ARRESTED, state(1.5e6), known=known)
+    >>> jumps, states = iter([rest, Jump(Outcome.SLIDING, None)]), iter([state(1e6), state(2e6)])
+    >>> search = SimpleNamespace(
+    ...     pieces=LINEAR, next=lambda *_: next(states), jump=lambda *_: next(jumps),
+    ...     at=lambda sample, start, load: state(load),
+    ...     stress_released=lambda state: 5e9 * state.slip,
+    ... )
+    >>> method = SimpleNamespace(search=lambda problem: search)
+    >>> values = _at_loads(problem, rows, np.array([5e5, 1e6, 1.7e6, 2e6, 2.1e6]), method)
+    >>> values["slip"][:, 3].round(9).tolist(), values["sliding"].tolist()
+    ([5e-07, 1e-06, 1.7e-06, 2e-06, nan], [False, False, False, False, True])
+    >>> values["mean_stress"].round(1).tolist(), values["arrested_events"].tolist()
+    ([497500.0, 995000.0, 1691500.0, 1990000.0, nan], [0, 0, 1, 1, 1])
+    >>> values["event_load"].tolist(), values["event_largest_slip"].round(12).tolist()
+    ([1000000.0], [5e-07])
+    """
     interface = problem.interface
     search = make_search(problem) if method is None else method.search(problem)
     warn_of_signs(problem)
