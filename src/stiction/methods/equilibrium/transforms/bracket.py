@@ -65,7 +65,21 @@ class TooSmallError(Exception):
 
 
 def _lifting_part(operator: Operator, can_break: Mask, guess: Array) -> tuple[Array, Array]:
-    """Do the same as `_lifting_field` for a part that can break: lowest eigenvector of A."""
+    """Do the same as `_lifting_field` for a part that can break: lowest eigenvector of A.
+
+    On eight nodes with K d = 8 d - D, D the sum of d, the lowest eigenvector on three nodes is
+    uniform, with the eigenvalue 8 - 3 - 5.5 Pa/m. On two nodes the eigenvalue is positive:
+
+    >>> operator = make_operator(np.array([0.0, 8, 8, 8, 8]), 5.5, (8,))
+    >>> y, lifted = _lifting_part(operator, np.arange(8) < 3, np.arange(1.0, 9.0))
+    >>> np.abs(y[:4]).round(4).tolist(), (lifted / y[0]).round(4).tolist()
+    ([0.5774, 0.5774, 0.5774, 0.0], [0.5, 0.5, 0.5, 3.0, 3.0, 3.0, 3.0, 3.0])
+    >>> try:
+    ...     _lifting_part(operator, np.arange(8) < 2, np.ones(8))
+    ... except TooSmallError:
+    ...     print("too small")
+    too small
+    """
     lifting = np.where(can_break, guess, 0.0)
     tolerance = LIFTING_RTOL * float(operator.weakening_rate.max())
     # The eigenvector z > 0 has A z = lambda z on the part, so A z < 0
@@ -86,6 +100,19 @@ def _lifting_field(operator: Operator) -> tuple[Array, Array]:
     other nodes, and w is the smallest positive W. For a Z-matrix, 0 <=
     g < 1. Then -A z is 0.4 w (1 - g) at nodes with W = 0, and at least
     W - 0.4 (w + W) g > 0 at other nodes.
+
+    Node 0 does not weaken. (K + 5.5) g is 5.5 there and the sum of g is 1, so
+    g is 6.5/13.5, and 1/13.5 at the other nodes:
+
+    >>> K = np.array([0.0, 8, 8, 8, 8])
+    >>> z, lifted = _lifting_field(make_operator(K, np.array([0.0] + [5.5] * 7), (8,)))
+    >>> np.round([1 - 0.4 * 6.5 / 13.5, 1 - 0.4 / 13.5] - z[:2], 9).tolist()
+    [0.0, 0.0]
+    >>> np.round([2.2 * (1 - 6.5 / 13.5), 5.5 - 4.4 / 13.5] - lifted[:2], 9).tolist()
+    [0.0, 0.0]
+    >>> z, lifted = _lifting_field(make_operator(K, 5.5, (8,)))
+    >>> z.tolist() == [1.0] * 8, lifted.round(9).tolist() == [5.5] * 8
+    (True, True)
     """
     lifting = np.ones(operator.weakening_rate.shape)
     free = operator.weakening_rate <= 0.0
@@ -112,6 +139,50 @@ class Bracket:
     (Pa) and load profile are fields (*shape). At nodes with
     infinite strength, slip and multiplier are zero. `lifting` is
     then a guess of the lowest eigenvector on all other nodes.
+
+    Eight nodes have K d = 8 d - D, with the sum D of d, and W = 5.5 Pa/m. The
+    first bounds are the least strength over load profile, and the mean
+    strength over the mean load profile:
+
+    >>> K, p = np.array([0.0, 8, 8, 8, 8]), np.ones(8)
+    >>> excess = np.array([1.0, 2, 3, 9, 9, 9, 9, 9])
+    >>> bracket = Bracket(K, 5.5, excess, p)
+    >>> bracket.lower, round(bracket.upper, 6)
+    (1.0, 6.375)
+    >>> double = Bracket(K, 5.5, excess, np.array([1.0, 4, 1, 1, 1, 1, 1, 1]))
+    >>> double.lower, round(double.upper - 51 / 11, 6)
+    (0.5, 0.0)
+
+    Slip of 0.4 m at node 0 proves min (1 + 1.5 x 0.4, 2 - 0.4) Pa. A worse slip changes nothing:
+
+    >>> bracket.raise_slip(np.array([0.4, 0, 0, 0, 0, 0, 0, -3.0]))
+    >>> bracket.raise_slip(np.zeros(8))
+    >>> round(bracket.lower, 6), bracket.slip[[0, 7]].tolist()
+    (1.6, [0.4, 0.0])
+
+    y = (2, 2, 1) has A y = (0, 0, -2.5) on nodes 0 to 2. Its bound is (2 + 4 +
+    3)/5. y = 1 at node 0 has A y = 1.5, so 1.5/5.5 is added everywhere:
+
+    >>> y = np.array([2.0, 2, 1, 0, 0, 0, 0, 0])
+    >>> round(bracket.raise_multiplier(y), 6), round(bracket.upper, 6), round(bracket.gap, 6)
+    (1.8, 1.8, 0.2)
+    >>> e, lift = np.eye(8)[0], 3 / 11
+    >>> abs(bracket.raise_multiplier(e) - (1 + 51 * lift) / (1 + 8 * lift)) < 1e-9
+    True
+    >>> round(bracket.upper, 6), bracket.raise_multiplier(-e)
+    (1.8, inf)
+    >>> bracket.closed(0.11), bracket.closed(0.12)
+    (False, True)
+
+    If the onset is close to zero, gaps refer to a hundredth of the strength,
+    10.5/4 Pa, over the load profile. Nodes that cannot break do not count:
+
+    >>> excess = np.array([-2.75, -1.75, -0.75, 5.25] + [np.inf] * 4)
+    >>> part = Bracket(K, 5.5, excess, np.append(2 * p[:4], p[4:]))
+    >>> round(abs(part.upper), 6), round(part.magnitude, 6), round(part.scale, 6)
+    (0.0, 0.013125, 0.02625)
+    >>> part.raise_multiplier(-part.excess) < np.inf, part.multiplier[4:].tolist()
+    (True, [0.0, 0.0, 0.0, 0.0])
     """
 
     def __init__(
@@ -207,6 +278,16 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
 
     The accuracy is the largest residual
     stress as a fraction of the mean strength.
+
+    The onset is 1.8 Pa, as in `fold.follow_to_turn`:
+
+    >>> K, excess = np.array([0.0, 8, 8, 8, 8]), np.array([1.0, 2, 3, 9, 9, 9, 9, 9])
+    >>> bracket = Bracket(K, 5.5, excess, np.ones(8))
+    >>> direction = bisect(bracket, 1e-3, 1e-6)
+    >>> 1.797 < bracket.lower < 1.8 + 1e-9, round(bracket.upper, 6)
+    (True, 2.0)
+    >>> round(float((direction**2).sum()), 6)
+    1.0
     """
     operator, excess, profile = bracket.operator, bracket.excess, bracket.profile
     direction = bracket.multiplier / np.sqrt((bracket.multiplier**2).sum())

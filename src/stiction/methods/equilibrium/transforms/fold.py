@@ -66,6 +66,18 @@ def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
     """Solve A x = right on the nodes inside.
 
     Return `None` if A is not positive definite there.
+
+    Eight nodes have K d = 8 d - D, with the sum D of d, and W = 5.5 Pa/m. On
+    two nodes, 2.5 d - D = (1, 2) Pa and D = 3/(2.5 - 2) m. Three nodes are
+    unstable:
+
+    >>> from stiction.elasticity.operator import make_operator
+    >>> operator = make_operator(np.array([0.0, 8, 8, 8, 8]), 5.5, (8,))
+    >>> right, inside = np.arange(1.0, 9.0), np.arange(8) < 2
+    >>> _solution(operator, inside, right).round(6).tolist()
+    [2.8, 3.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    >>> _solution(operator, np.arange(8) < 3, right) is None
+    True
     """
     x, residual = np.zeros(right.size), np.where(inside, right, 0.0)
     tolerance = SOLUTION_RTOL * float(np.abs(residual).max())
@@ -79,6 +91,20 @@ def _equilibrium_near(
     """Step 1: improve a rough slip at a load.
 
     Return `None` without an equilibrium nearby.
+
+    Node 0 has a constant strength of 0.8 Pa beyond 0.1 m, so 8 d_0 - D = 2 -
+    0.8, and node 1 has 6 d_1 - D = 2 - 2. Therefore D = 0.15/(1 - 1/8 - 1/6)
+    m. Three nodes are unstable:
+
+    >>> from stiction.elasticity.operator import make_operator
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> operator = make_operator(np.array([0.0, 8, 8, 8, 8]), 2.0, (8,))
+    >>> excess, residual = np.array([[1.0, 2, 3, 9, 9, 9, 9, 9], [0.8, 0, 0, 0, 0, 0, 0, 0]])
+    >>> sample = make_sample(excess, residual, np.ones(8), np.full(8, 2.0), LINEAR)
+    >>> _equilibrium_near(operator, sample, 2.0, 0.05 * np.eye(8)[0])[:3].round(6).tolist()
+    [0.176471, 0.035294, 0.0]
+    >>> _equilibrium_near(operator, sample, 20.0, np.zeros(8)) is None
+    True
     """
     tolerance = residual_tolerance(sample, load, TURN_SLIP_RTOL)
     for _ in range(MAX_PIECE_REVISIONS):
@@ -99,6 +125,36 @@ def follow_to_turn(
 
     Returns `None` if the path is not stable at the first load, or after
     too many events.
+
+    Eight nodes have K d = 8 d - D, with the sum D of d, and W = 5.5 Pa/m. Node
+    0 starts at 1 Pa, and node 1 at 1.6 Pa, where d_0 = 0.6/1.5 m. From then
+    on, D = 4 load - 6, and the path turns when node 2 starts, at 1.8 Pa:
+
+    >>> from stiction.elasticity.operator import make_operator
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> operator = make_operator(np.array([0.0, 8, 8, 8, 8]), 5.5, (8,))
+    >>> excess, W = np.array([1.0, 2, 3, 9, 9, 9, 9, 9]), np.full(8, 5.5)
+    >>> sample = make_sample(excess, np.full(8, -9.0), np.ones(8), W, LINEAR)
+    >>> turn = follow_to_turn(operator, sample, 1.2, 3.0, np.zeros(8))
+    >>> round(turn.load, 6), turn.slip[:3].round(6).tolist()
+    (1.8, [0.8, 0.4, 0.0])
+    >>> turn.direction[:4].round(6).tolist()
+    [0.4, 0.4, 0.2, 0.0]
+
+    Node 0 may reach its residual strength of -1.75 Pa, after 0.5 m at 1.65 Pa.
+    At 1.7 Pa, 8 d_0 - D = 3.45 Pa and 2.5 d_1 - D = -0.3 Pa:
+
+    >>> residual = np.where(excess > 1.0, -9.0, -1.75)
+    >>> sample = make_sample(excess, residual, np.ones(8), W, LINEAR)
+    >>> turn = follow_to_turn(operator, sample, 1.2, 1.7, np.zeros(8))
+    >>> turn.load, turn.slip[:3].round(6).tolist(), turn.direction
+    (1.7, [0.513158, 0.142105, 0.0], None)
+
+    Three nodes that slip at the first load are not stable:
+
+    >>> sample = make_sample(np.ones(8), np.full(8, -9.0), np.ones(8), W, LINEAR)
+    >>> follow_to_turn(operator, sample, 1.2, 3.0, np.zeros(8)) is None
+    True
     """
     # 1.
     start = _equilibrium_near(operator, sample, load, slip)

@@ -59,7 +59,18 @@ nodes is revised."""
 
 @jit_inside
 def _revise(inside: Mask, slip: Array, residual: Array, tolerance: float) -> tuple[int, int]:
-    """Step 1: return the numbers of nodes that joined and left."""
+    """Step 1: return the numbers of nodes that joined and left.
+
+    Node 0 slips backwards and leaves. Node 2 is overloaded and joins. Node 3 is overloaded by
+    no more than the tolerance:
+
+    >>> import numpy as np
+    >>> inside, slip = np.array([True, True, False, False]), np.array([-0.1, 0.0, 0.0, 0.0])
+    >>> _revise.py_func(inside, slip, np.array([9.0, 9.0, 0.6, 0.5]), 0.5)
+    (1, 1)
+    >>> inside.tolist(), slip.tolist()
+    ([False, True, True, False], [0.0, 0.0, 0.0, 0.0])
+    """
     joined, left = 0, 0
     for i in range(slip.size):
         if inside[i]:
@@ -85,6 +96,26 @@ def equilibrate(
     they are the solution. If (1) is solved, the residual r does not
     exceed the tolerance (Pa) at any node, and on the set it is within
     twice the tolerance.
+
+    If K(k) = 8 for all waves, K d = 8 d - D on eight nodes, with the sum D of
+    the slip. Nodes 0, 1 and 2 slip, so that D = (3 + 1 - 0.5 + 3 D)/8 = 0.7
+    m, and node 4 leaves:
+
+    >>> import numpy as np
+    >>> from stiction.elasticity.operator import make_operator
+    >>> K, right = np.array([0.0, 8, 8, 8, 8]), np.array([3, 1, -0.5, -0.71, -3, -9, -9, -9])
+    >>> inside, slip = np.zeros(8, dtype=bool), np.array([0.1, 0, 0, 0, 0.2, 0, 0, 0])
+    >>> inside[[0, 1, 4]] = True
+    >>> equilibrate(make_operator(K, 0.0, (8,)), right, inside, slip, 1e-9) == SOLVED
+    True
+    >>> slip.round(6).tolist()
+    [0.4625, 0.2125, 0.025, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+    With W = 5.5 Pa/m, the stiffness of m nodes that slip equally is 8 - m - 5.5 Pa/m:
+
+    >>> inside, slip, unstable = slip < 0.0, np.zeros(8), make_operator(K, 5.5, (8,))
+    >>> equilibrate(unstable, right, inside, slip, 1e-9) == NEGATIVE_CURVATURE
+    True
     """
     residual = operator.residual
     # 1. Begin with the nodes that the guess overloads.

@@ -102,7 +102,13 @@ BISECTED_RESIDUAL = 0.05
 
 
 def halved(fine: Array) -> Array:
-    """Return values at every second node, averaged with weights 1/4, 1/2, 1/4 along each axis."""
+    """Return values at every second node, averaged with weights 1/4, 1/2, 1/4 along each axis.
+
+    >>> halved(np.array([1.0, 2, 5, 10, 3, 0])).tolist()
+    [1.0, 5.5, 4.0]
+    >>> halved(np.array([[8.0, 0, 4, 0], [0, 0, 0, 0], [0, 0, 0, 16], [0, 0, 0, 0]])).tolist()
+    [[2.0, 1.0], [2.0, 2.0]]
+    """
     for axis in range(fine.ndim):
         even, odd = ((*(slice(None),) * axis, slice(first, None, 2)) for first in (0, 1))
         fine = 0.5 * fine[even] + 0.25 * (fine[odd] + np.roll(fine[odd], 1, axis))
@@ -110,7 +116,13 @@ def halved(fine: Array) -> Array:
 
 
 def doubled(coarse: Array) -> Array:
-    """Return values interpolated linearly to twice as many nodes along each axis."""
+    """Return values interpolated linearly to twice as many nodes along each axis.
+
+    >>> doubled(np.array([1.0, 5.0, 3.0])).tolist()
+    [1.0, 3.0, 5.0, 4.0, 3.0, 2.0]
+    >>> doubled(np.array([[1.0, 3.0], [5.0, 3.0]])).tolist()[:2]
+    [[1.0, 2.0, 3.0, 2.0], [3.0, 3.0, 3.0, 3.0]]
+    """
     for axis in range(coarse.ndim):
         between = 0.5 * (coarse + np.roll(coarse, -1, axis))
         shape = tuple(n * (1 + (a == axis)) for a, n in enumerate(coarse.shape))
@@ -135,7 +147,11 @@ def halved_strength(fine: Array) -> Array:
 
 
 def _refined(coarse: Array, shape: tuple[int, ...]) -> Array:
-    """Return a flattened field on the next finer grid of the given shape."""
+    """Return a flattened field on the next finer grid of the given shape.
+
+    >>> _refined(np.array([1.0, 3.0, 5.0]), (2, 6)).tolist()
+    [1.0, 2.0, 3.0, 4.0, 5.0, 3.0, 1.0, 2.0, 3.0, 4.0, 5.0, 3.0]
+    """
     return doubled(coarse.reshape([nodes // 2 for nodes in shape])).flatten()
 
 
@@ -144,6 +160,13 @@ def _narrow(bracket: Bracket, gap: float) -> float:
 
     Returns the curvature. If the stiffness is not a Z-matrix, the
     bounds may not meet.
+
+    The onset of the example in `fold.follow_to_turn` is 1.8 Pa:
+
+    >>> K, excess = np.array([0.0, 8, 8, 8, 8]), np.array([1.0, 2, 3, 9, 9, 9, 9, 9])
+    >>> bracket = Bracket(K, 5.5, excess, np.ones(8))
+    >>> _narrow(bracket, 1e-7) < 0.0, bracket.closed(1e-7), round(bracket.upper, 5)
+    (True, True, 1.8)
     """
     share, finest = BISECTED_GAP, 0.1 * gap
     bend = 0.0
@@ -180,6 +203,31 @@ def plane_onset(
     search stops when the bounds agree to a relative `gap`. If a node of
     a coarse grid slips beyond its corner, the bracket of this grid is
     returned.
+
+    The onset is the largest load with A d + s - load p >= 0, which `linprog`
+    finds without transforms:
+
+    >>> from scipy.optimize import linprog
+    >>> half_spaces, shape = HalfSpaces((1.0, 1.6), (4.0, 3.0)), (12, 16)
+    >>> x, y = np.indices(shape)
+    >>> excess, p = 3.0 + np.cos(x + 0.3 * y) + np.sin(2.0 * y), 1.0 + 0.1 * np.sin(y)
+    >>> W = 15.0 + 0.5 * x
+    >>> waves = half_spaces.symbol(shape) * np.fft.rfft2(np.eye(192).reshape(192, *shape))
+    >>> A = np.fft.irfft2(waves, shape).reshape(192, 192) - np.diag(W.ravel())
+    >>> limits = np.column_stack((p.ravel(), -A))
+    >>> exact = -linprog(-np.eye(193)[0], limits, excess.ravel()).fun
+    >>> bracket = plane_onset(half_spaces, excess, p, W, 1e-6)
+    >>> bracket.lower < exact + 1e-9, bracket.upper > exact - 1e-9, bracket.closed(1e-6)
+    (True, True, True)
+
+    If a node slips beyond its corner, the search stops at a coarse grid:
+
+    >>> x, y = np.indices((16, 16))
+    >>> excess, one = 3.0 + np.cos(x + 0.3 * y), np.ones((16, 16))
+    >>> for corner in (0.001 * one, None):
+    ...     print(plane_onset(half_spaces, excess, one, 6.0 * one, corner=corner).slip.size)
+    64
+    256
     """
     # 1.
     corners = np.zeros_like(excess) if corner is None else corner
@@ -228,7 +276,55 @@ def plane_onset(
 
 
 class PlaneSearch:
-    """Thread-safe search for equilibria of a plane, to a relative gap between bounds."""
+    """Thread-safe search for equilibria of a plane, to a relative gap between bounds.
+
+    The onset of the plane in `plane_onset` is 1.849481 Pa. The slip at 1.8 Pa
+    satisfies the law, and the plane slides after the onset:
+
+    >>> from stiction.methods.equilibrium.strength import LINEAR
+    >>> from stiction.methods.equilibrium.strength import make_sample, present_pieces
+    >>> search = PlaneSearch.__new__(PlaneSearch)
+    >>> search.elastic, search.shape = HalfSpaces((1.0, 1.6), (4.0, 3.0)), (12, 16)
+    >>> search.pieces, search.requested = LINEAR._replace(at_corner=AT_CORNER), 1e-6
+    >>> x, y = (values.ravel() for values in np.indices(search.shape))
+    >>> excess, p = 3.0 + np.cos(x + 0.3 * y) + np.sin(2.0 * y), 1.0 + 0.1 * np.sin(y)
+    >>> sample = make_sample(excess, np.full(192, -9.0), p, 15.0 + 0.5 * x, search.pieces)
+    >>> def overload(sample, state):
+    ...     present = present_pieces(sample, state.slip)
+    ...     strength = present.strength - present.weakening_rate * state.slip
+    ...     overload = state.load * sample.profile - search.stress_released(state) - strength
+    ...     slips = state.slip > 0.0
+    ...     return bool(overload.max() < 1e-4), bool(np.abs(overload[slips]).max() < 1e-4)
+    >>> onset = search.next(sample)
+    >>> round(onset.load, 5), onset.certified, bool(onset.gap < 2e-6), overload(sample, onset)
+    (1.84948, True, True, (True, True))
+    >>> reached = search.at(sample, at_rest(sample), 1.8)
+    >>> reached.load, overload(sample, reached), search.at(sample, onset, 1.9)
+    (1.8, (True, True), None)
+    >>> search.jump(sample, onset).outcome.name
+    'SLIDING'
+
+    If strength falls by 0.5 Pa only, nodes pass corners before the path turns:
+
+    >>> sample = make_sample(excess, excess - 0.5, p, 15.0 + 0.5 * x, search.pieces)
+    >>> turn = search.next(sample)
+    >>> turn.certified, exceeds(sample, turn.slip), overload(sample, turn)
+    (False, True, (True, True))
+    >>> search.jump(sample, turn).outcome.name
+    'SLIDING'
+
+    Strong nodes stop a jump, and the path goes on from there:
+
+    >>> excess += 4.0 * (x > 7)
+    >>> sample = make_sample(excess, excess - 0.5, p, 15.0 + 0.5 * x, search.pieces)
+    >>> turn = search.next(sample)
+    >>> jump = search.jump(sample, turn)
+    >>> jump.outcome.name, jump.state.load > turn.load, overload(sample, jump.state)
+    ('ARRESTED', True, (True, True))
+    >>> later = search.next(sample, jump.state)
+    >>> later.load > jump.state.load, overload(sample, later)
+    (True, (True, True))
+    """
 
     def __init__(self, problem: Problem, gap: float = 1e-6) -> None:
         self.elastic = problem.half_spaces

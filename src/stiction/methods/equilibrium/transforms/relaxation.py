@@ -135,6 +135,16 @@ def solve_pieces(
     """Solve (1) for given pieces, with drive = load p - q.
 
     Return the status and the slip.
+
+    Eight nodes have K d = 8 d - D, with the sum D of d. Node 0 has 4 d_0 - D =
+    3 Pa and node 1 has 6 d_1 - D = 1 Pa, so (1 - 1/4 - 1/6) D = 3/4 + 1/6 m:
+
+    >>> from stiction.elasticity.operator import make_operator
+    >>> operator, W = make_operator(np.array([0.0, 8, 8, 8, 8]), 0.0, (8,)), np.full(8, 2.0)
+    >>> W[0], drive = 4.0, np.array([3.0, 1, -3, -9, -9, -9, -9, -9])
+    >>> status, slip = solve_pieces(operator, drive, W, np.zeros(8), 1e-9)
+    >>> status == SOLVED, slip[:3].round(6).tolist()
+    (True, [1.142857, 0.428571, 0.0])
     """
     # Nodes that the load alone would overload begin inside; the others
     # join if they must.
@@ -150,6 +160,16 @@ def _is_definite(operator: Operator, W: Array, growth: Array, slip: Array) -> bo
     The search begins with the growth of slip, which is close to the
     direction in which stability is lost. It continues in the directions
     of conjugate gradients.
+
+    With W = 5.5 Pa/m, the stiffness of m equal nodes is 8 - m - 5.5 Pa/m: two
+    are stable, and three are not, even if slip grows at a single node:
+
+    >>> from stiction.elasticity.operator import make_operator
+    >>> operator, W = make_operator(np.array([0.0, 8, 8, 8, 8]), 0.0, (8,)), np.full(8, 5.5)
+    >>> node, two, three = (1.0 * (np.arange(8) < m) for m in (1, 2, 3))
+    >>> pairs = (two, two), (three, three), (node, three), (node, two)
+    >>> [_is_definite(operator, W, growth, slip) for growth, slip in pairs]
+    [True, False, False, True]
     """
     operator, inside = operator._replace(weakening_rate=W), slip > 0.0
     solution, image = np.zeros_like(slip), np.empty_like(slip)
@@ -178,6 +198,37 @@ def stable_equilibrium(
     The path begins at an equilibrium with less slip at a lower load.
     The guess is a slip at the end of the path. The accuracy is the
     largest residual stress as a fraction of the mean strength or load.
+
+    Eight nodes have K d = 8 d - D, with the sum D of d, and W = 2 Pa/m. At 2
+    Pa, 6 d_0 - D = 1 Pa and 6 d_1 - D = 0 Pa. If node 0 has a constant
+    strength of 0.8 Pa beyond 0.1 m, 8 d_0 - D = 1.2 Pa:
+
+    >>> from stiction.elasticity.operator import make_operator
+    >>> from stiction.methods.equilibrium.strength import LINEAR, Pieces, make_sample
+    >>> operator = make_operator(np.array([0.0, 8, 8, 8, 8]), 0.0, (8,))
+    >>> excess, residual = np.array([[1.0, 2, 3, 9, 9, 9, 9, 9], [0.8] + [-9.0] * 7])
+    >>> def slip_at(load, residual, W, excess=excess, pieces=LINEAR):
+    ...     sample, start = make_sample(excess, residual, np.ones(8), W, pieces), np.zeros(8)
+    ...     end = stable_equilibrium(operator, sample, load, start, 1e-9, start)
+    ...     return None if end is None else end[:3].round(5).tolist()
+    >>> W = np.full(8, 2.0)
+    >>> slip_at(2.0, residual - 9.0, W), slip_at(2.0, residual, W)
+    ([0.20833, 0.04167, 0.0], [0.17647, 0.03529, 0.0])
+
+    With W = 5.5 Pa/m, the path turns at 1.8 Pa (`fold.follow_to_turn`):
+
+    >>> slip_at(1.7, residual - 9.0, W + 3.5), slip_at(2.0, residual - 9.0, W + 3.5)
+    ([0.6, 0.2, 0.0], None)
+
+    On a steep second piece, node 0 has the stiffness 7 - 9 Pa/m and jumps,
+    although it is stable before and after. On a flat one, 7 d = 3 - 0.6 + d:
+
+    >>> ends, starts = np.array([0.5, 1.0]), np.array([1.0, 1.5, 0.0])
+    >>> steep = Pieces(ends, starts, np.array([1.0, 3.0, 0.0]), 0.5, 0.6)
+    >>> flat = Pieces(ends, np.array([1.0, 0.5, 0.0]), np.array([1.0, 1 / 3, 0.0]), 1.5, 0.4)
+    >>> strong, none = np.where(excess > 1.0, 9.0, 1.2), np.zeros(8)
+    >>> [slip_at(3.0, none, W + 1.0, strong, pieces) for pieces in (steep, flat)]
+    [None, [0.4, 0.0, 0.0]]
     """
     tolerance = residual_tolerance(sample, load, accuracy)
     pieces, start = sample.pieces, present_pieces(sample, slip)
@@ -230,6 +281,30 @@ def _bound(
     lines, and Newton's method finds which line applies
     at each node. The drive is reduced by the allowed
     residual, so that a rough slip is also a bound.
+
+    Node 0 has 7 d = 2 - 1 + W d, with W = 4 Pa/m until its strength is 0.4 Pa at 0.15 m:
+
+    >>> from stiction.elasticity.operator import make_operator
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> operator = make_operator(np.array([0.0, 8, 8, 8, 8]), 0.0, (8,))
+    >>> excess, residual = np.array([[1.0] + [9.0] * 7, [0.4] + [0.0] * 7])
+    >>> sample = make_sample(excess, residual, np.ones(8), np.full(8, 4.0), LINEAR)
+    >>> def bound(load, omitted, slip=0.0):
+    ...     slip = slip * np.eye(8)[0]
+    ...     present = present_pieces(sample, slip)
+    ...     status, end, rests = _bound(operator, sample, load, slip, present, omitted, 1e-9)
+    ...     return status, round(float(end[0]), 6), rests
+    >>> bound(1.3, 0.0), bound(2.0, 0.0)  # 0.3/3 m on the slope, 1.6/7 m beyond
+    ((0, 0.1, True), (0, 0.228571, True))
+
+    If three quarters are omitted, W is 1 Pa/m less 0.75 times the drag of 0.004 Pa/m:
+
+    >>> _, slip, rests = bound(1.3, 0.75)
+    >>> slip == round(0.3 / (7 - 1 + 0.003), 6), rests
+    (True, False)
+    >>> _, slip, _ = bound(1.3, 0.75, 0.06)  # the strength is 0.76 Pa at 0.06 m
+    >>> slip == round((1.3 - 0.76 - 0.997 * 0.06) / 6.003, 6)
+    True
     """
     drag = DRAG * float(sample.weakening_rate.max())
     W = (1.0 - omitted) * present.weakening_rate - omitted * drag
@@ -268,6 +343,22 @@ def _step_to_corner(
     equilibrium or, without an equilibrium, along y >= 0 with A y =
     lambda y, lambda < 0. In both cases every moving node remains
     overloaded or balanced, so that the next equilibrium is not passed.
+
+    Node 0 with W = 9 Pa/m is unstable and goes to its corner at 0.1 m. With W
+    = 4 Pa/m it goes to its equilibrium at 0.3/3 m, or to its corner at 0.225 m:
+
+    >>> from stiction.elasticity.operator import make_operator
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> operator = make_operator(np.array([0.0, 8, 8, 8, 8]), 0.0, (8,))
+    >>> excess, residual = np.array([[1.0] + [9.0] * 7, [0.1] + [0.0] * 7])
+    >>> for W, load in (9.0, 1.0), (9.0, 1.3), (4.0, 1.3), (4.0, 3.0):
+    ...     sample = make_sample(excess, residual, np.ones(8), np.full(8, W), LINEAR)
+    ...     slip = _step_to_corner(operator, sample, load, 0.01 * np.eye(8)[0], 1e-9)
+    ...     print(slip[:2].round(6).tolist())
+    [0.1, 0.0]
+    [0.1, 0.0]
+    [0.1, 0.0]
+    [0.225, 0.0]
     """
     present = present_pieces(sample, slip)
     operator = operator._replace(weakening_rate=present.weakening_rate)
@@ -315,6 +406,33 @@ def least_equilibrium(
     largest residual stress as a fraction of the mean strength or load. If
     an interface ends, it slides when all nodes that can break slip,
     unless it is followed `to_rest`.
+
+    Node 0 loses its strength of 1 Pa and comes to rest with 7 d = 1.5 - 0.1. If node 1 bears
+    only 1.6 Pa, less than 1.5 Pa and d, it jumps as well, to 6 d = 1.4 at both nodes:
+
+    >>> from stiction.elasticity.operator import make_operator
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> operator = make_operator(np.array([0.0, 8, 8, 8, 8]), 0.0, (8,))
+    >>> def end(load, second, slip=0.0, third=9.0, **options):
+    ...     excess = np.array([1.0, second, third, 9, 9, 9, 9, 9])
+    ...     residual = np.where(excess < 2.0, 0.1, 0.0)
+    ...     sample = make_sample(excess, residual, np.ones(8), np.full(8, 9.0), LINEAR)
+    ...     found = least_equilibrium(operator, sample, load, slip * np.eye(8)[0], **options)
+    ...     return found.status.name, found.slip[:3].round(4).tolist()
+    >>> end(1.5, 9.0), end(1.5, 1.6)
+    (('ARRESTED', [0.2, 0.0, 0.0]), ('ARRESTED', [0.2333, 0.2333, 0.0]))
+    >>> end(0.99, 9.0, 0.01, is_unstable=True), end(9.5, 9.0)[0]
+    (('ARRESTED', [0.1271, 0.0, 0.0]), 'SLIDING')
+
+    If the interface ends, it slides when every node that can break slips:
+
+    >>> excess = np.array([1.0, 1.6] + [np.inf] * 6)
+    >>> sample = make_sample(excess, np.full(8, 0.1), np.ones(8), np.full(8, 9.0), LINEAR)
+    >>> for to_rest in (True, False):
+    ...     found = least_equilibrium(operator, sample, 1.5, np.zeros(8), to_rest=to_rest)
+    ...     print(found.status.name)
+    ARRESTED
+    SLIDING
     """
     tolerance = residual_tolerance(sample, load, accuracy)
     slip, weakens = np.maximum(slip, 0.0), sample.critical > 0.0

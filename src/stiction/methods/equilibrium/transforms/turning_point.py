@@ -109,6 +109,26 @@ def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | 
     The guess gives the amplitude at which the
     spring has no force. The accuracy is the largest
     residual stress as a fraction of the mean strength.
+
+    Eight nodes have K d = 8 d - D, with the sum D of d, and W = 5.5 Pa/m. A
+    spring of 11 Pa/m holds three equally strong nodes at the mean slip 0.6 m.
+    By (1), 1.8 - 2 + mu/sqrt(3) = (8 - 3 - 5.5) d, and mu' is -0.5 Pa/m:
+
+    >>> K, excess = np.array([0.0, 8, 8, 8, 8]), np.array([2.0, 2, 2, 9, 9, 9, 9, 9])
+    >>> bracket, phi = Bracket(K, 5.5, excess, np.ones(8)), (np.arange(8) < 3) / 3**0.5
+    >>> guess = Held(1.8, 0.6 * 3**0.5, 0.5 * phi, phi)
+    >>> held = _hold(bracket, phi, guess, 1e-9)
+    >>> d = (11 * 0.6 + 1.8 - 2) / (11 - 0.5)
+    >>> np.allclose(held.slip, [d, d, d, 0, 0, 0, 0, 0], atol=1e-6)
+    True
+    >>> root, (amplitude, _, slope, force, slope_of_force, by_load) = 3**0.5, held[1:]
+    >>> np.allclose(slope, phi, atol=1e-6), round(slope_of_force, 6)
+    (True, -0.5)
+    >>> numbers = amplitude / root, force / root, by_load / root
+    >>> np.allclose(numbers, [d, 11 * (0.6 - d), -1.0], atol=1e-6)
+    True
+    >>> _hold(bracket, np.eye(8)[0], guess._replace(slope=-phi), 1e-9) is None
+    True
     """
     excess, profile = bracket.excess, bracket.profile
     load, amplitude = guess.load, guess.amplitude
@@ -141,7 +161,19 @@ def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | 
 
 
 def _other_patch(bracket: Bracket) -> Array | None:
-    """Step 2: return the unstable patch (unit norm) next to the held patch, or `None`."""
+    """Step 2: return the unstable patch (unit norm) next to the held patch, or `None`.
+
+    Three nodes have the lowest eigenvector (1, 1, 1), whose bound is their mean strength:
+
+    >>> K, excess = np.array([0.0, 8, 8, 8, 8]), np.array([1.0, 2, 3, 9, 9, 9, 9, 9])
+    >>> bracket = Bracket(K, 5.5, excess, np.ones(8))
+    >>> bracket.inside[:3], bracket.operator.direction[:] = True, [-1, 2, 3, 4, 0, 0, 0, 0]
+    >>> np.abs(_other_patch(bracket)[:4]).round(3).tolist(), round(bracket.upper, 3)
+    ([0.577, 0.577, 0.577, 0.0], 2.0)
+    >>> bracket.operator.direction[:] = 0.0
+    >>> _other_patch(bracket) is None
+    True
+    """
     vector = np.where(bracket.inside, np.abs(bracket.operator.direction), 0.0)
     if not vector.any():
         return None
@@ -154,14 +186,38 @@ def _other_patch(bracket: Bracket) -> Array | None:
 
 
 def _load_at(state: Held, amplitude: float, curvature: float = 0.0) -> float:
-    """Step 5: return the load (Pa) without spring force at an amplitude, from a state nearby."""
+    """Step 5: return the load (Pa) without spring force at an amplitude, from a state nearby.
+
+    The force 3 + (0.5 - 0.5 x 2/2) x 2 Pa at a + 2 falls by 4 per load:
+
+    >>> state = Held(10.0, 5.0, None, None, 3.0, 0.5, -4.0)
+    >>> _load_at(state, 7.0), _load_at(state, 7.0, -0.5), _load_at(state, 5.0)
+    (11.0, 10.75, 10.75)
+    """
     step = amplitude - state.amplitude
     force = state.force + (state.slope_of_force + 0.5 * curvature * step) * step
     return state.load - force / state.force_by_load
 
 
 def _amplitude_between(below: Held, above: Held, is_linear: bool) -> float:
-    """Step 4: guess the turning point between states with mu' > 0 and mu' < 0."""
+    """Step 4: guess the turning point between states with mu' > 0 and mu' < 0.
+
+    A linear mu' falls from 3 to -1 between a = 2 and 6, and is zero at three
+    quarters. If mu' has a single step, the loads of both states agree there,
+    unless the step lies beyond one of them:
+
+    >>> below = Held(10.0, 2.0, None, None, 0.0, 3.0, -2.0)
+    >>> above = Held(14.0, 6.0, None, None, 0.0, -1.0, -4.0)
+    >>> _amplitude_between(below, above, True)
+    5.0
+    >>> a = _amplitude_between(below, above, False)
+    >>> round(_load_at(below, a) - _load_at(above, a), 9)
+    0.0
+    >>> _amplitude_between(below, above._replace(load=30.0), False)
+    6.0
+    >>> _amplitude_between(below, above._replace(load=5.0), False)
+    2.0
+    """
     width = above.amplitude - below.amplitude
     if is_linear:  # mu' is linear in a, as where many nodes join one after the other
         share = below.slope_of_force / (below.slope_of_force - above.slope_of_force)
@@ -182,6 +238,27 @@ def _step_across(state: Held, step: float, last: float, curvature: float, moved:
     Because mu' falls in steps as nodes join, the new step is slightly
     longer than Newton's. It is twice as long as the previous step if
     mu' hardly changed.
+
+    mu' = 0.6 falls by 2 per amplitude. Newton's step is 0.3, and 1.2 times as
+    long here. A step is at most 0.3 times the amplitude:
+
+    >>> wide, narrow = (Held(1.0, a, None, None, 0.0, 0.6) for a in (9.0, 0.5))
+    >>> [round(_step_across(state, 0.1, 1.0, -2.0, False), 6) for state in (wide, narrow)]
+    [0.36, 0.15]
+
+    If mu' fell from 0.8 to 0.6 only, the next step is twice as long as the
+    last, unless Newton's is longer:
+
+    >>> [round(_step_across(wide, step, 0.8, -2.0, True), 6) for step in (0.25, 0.15)]
+    [0.5, 0.36]
+    >>> round(_step_across(wide, 0.25, 0.9, -2.0, True), 6)
+    0.36
+
+    If mu' does not fall, the step is a third of the longest, forwards or back:
+
+    >>> back = wide._replace(slope_of_force=-1.0)
+    >>> [round(_step_across(state, 0.1, 1.0, 0.0, True), 6) for state in (wide, back)]
+    [0.9, -0.9]
     """
     longest = MAX_STEP * state.amplitude
     if curvature >= 0.0:
@@ -202,6 +279,23 @@ def close_by_newton(
     `bend` is the curvature a d mu'/da (Pa/m, negative) if it
     is known. Return whether the bounds are within `gap` of
     the load, and the curvature that was found.
+
+    The onset of the example in `fold.follow_to_turn` is 1.8 Pa:
+
+    >>> K, excess = np.array([0.0, 8, 8, 8, 8]), np.array([1.0, 2, 3, 9, 9, 9, 9, 9])
+    >>> slip, phi = np.array([[0.7, 0.3, 0, 0, 0, 0, 0, 0], [2, 2, 1, 0, 0, 0, 0, 0]])
+    >>> bracket = Bracket(K, 5.5, excess, np.ones(8))
+    >>> closed, bend = close_by_newton(bracket, phi / 3.0, 1.75, slip, 1e-6)
+    >>> closed, round(bracket.lower, 4), round(bracket.upper, 4), bend < 0.0
+    (True, 1.8, 1.8, True)
+    >>> close_by_newton(bracket, phi, 1.75, slip, 1e-6, -4.0)  # closed already
+    (True, -4.0)
+
+    If node 5 is held, the patch of nodes 0 to 2 is unstable, and is held instead:
+
+    >>> bracket = Bracket(K, 5.5, excess, np.ones(8))
+    >>> close_by_newton(bracket, np.eye(8)[5], 1.9, slip, 1e-6)[0], round(bracket.upper, 4)
+    (True, 1.8)
     """
     if bracket.closed(gap):
         return True, bend
