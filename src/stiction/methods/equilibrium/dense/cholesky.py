@@ -57,6 +57,49 @@ one row is appended:
 >>> workspace.diagonal[:3], workspace.is_slipping[:3], workspace.queue[:2] = 1.0, False, (0, 1)
 >>> append(workspace, 0, 2)
 1
+
+All four steps on 24 nodes. Here `is_factor` compares L L' with A on the nodes in S:
+
+>>> n, i = 24, np.arange(24)
+>>> K = np.diag(30.0 + i) - np.abs(np.cos(np.add.outer(i, i) + np.outer(i, i)))
+>>> workspace = make_workspace(DenseEntries(K.ravel(), n, 0.0), n)
+>>> A, workspace.diagonal[:], workspace.is_slipping[:] = K.copy(), np.diag(K), False
+>>> def is_factor(count):
+...     S, L = workspace.slipping[:count], np.zeros((count, count))
+...     for r in range(count):
+...         L[r, : r + 1] = workspace.factor[row_start(r) : row_start(r) + r + 1]
+...     marked = workspace.is_slipping.nonzero()[0].tolist() == sorted(S.tolist())
+...     return marked and np.allclose(L @ L.T, A[np.ix_(S, S)], atol=1e-9)
+>>> workspace.queue[:18] = (5 * i[:18] + 3) % n  # 3, 8, 13, ...
+>>> append(workspace, 0, 5), is_factor(5)
+(5, True)
+>>> workspace.queue[:13] = workspace.queue[5:18].copy()
+>>> append(workspace, 5, 13), is_factor(18)
+(18, True)
+>>> remove(workspace, 18, 4), is_factor(17), remove(workspace, 17, 16), is_factor(16)
+(17, True, 16, True)
+>>> j = workspace.slipping[3]
+>>> A[j, j] = workspace.diagonal[j] = workspace.factored_diagonal[3] = K[j, j] + 2.5
+>>> raise_diagonal(workspace, 16, 3, 2.5)
+>>> is_factor(16)
+True
+
+Then the nodes of two rows stop, node 21 joins, and some nodes weaken less or
+more. A keeps the node that weakens less in its row:
+
+>>> def change(row, amount):
+...     j = workspace.slipping[row]
+...     A[j, j] = workspace.diagonal[j] = A[j, j] + amount
+>>> workspace.is_slipping[workspace.slipping[[9, 12]]] = False
+>>> workspace.is_slipping[21], kept = True, workspace.slipping[:9].tolist()
+>>> change(2, 1.5), change(13, -0.5), factor_slipping(workspace), is_factor(15)
+(None, None, 15, True)
+>>> workspace.slipping[:9].tolist() == kept
+True
+>>> change(12, 3.5), factor_slipping(workspace), is_factor(15)
+(None, 15, True)
+>>> change(5, -0.5), factor_slipping(workspace), is_factor(15)
+(None, 15, True)
 """
 
 import math
@@ -85,14 +128,24 @@ MAX_SLIPPING = 8192
 
 @jit
 def row_start(row: int) -> int:
-    """Return the index at which a row of L begins in the flat array."""
+    """Return the index at which a row of L begins in the flat array.
+
+    The rows 0 to 7 take 8 numbers each, and the rows 8 to 15 take 16 each:
+
+    >>> [row_start(r) for r in (0, 1, 7, 8, 9, 15, 16, 17)]
+    [0, 8, 56, 64, 80, 176, 192, 216]
+    """
     block = row >> 3
     return 32 * block * (block + 1) + 8 * (row & 7) * (block + 1)
 
 
 @jit_inside
 def row_slice(row: int, length: int) -> slice:
-    """Return the slice of the flat array with the first entries in a row of L."""
+    """Return the slice of the flat array with the first entries in a row of L.
+
+    >>> row_slice.py_func(9, 4)
+    slice(80, 84, None)
+    """
     start = row_start(row)
     return slice(start, start + length)
 
@@ -102,6 +155,19 @@ def forward_substitute(factor: Array, first: int, last: int, values: Array) -> N
     """Solve L x = values in place for the rows first..last-1.
 
     Rows before them are solved.
+
+    L has the rows (2), (1, 4) and (3, 1, 5):
+
+    >>> L = np.zeros(24)
+    >>> L[0], L[8:10], L[16:19] = 2.0, (1.0, 4.0), (3.0, 1.0, 5.0)
+    >>> x = np.array([4.0, 10.0, 18.0])
+    >>> forward_substitute(L, 0, 3, x)
+    >>> x.tolist()
+    [2.0, 2.0, 2.0]
+    >>> x = np.array([2.0, 2.0, 18.0])  # the first two rows are solved
+    >>> forward_substitute(L, 2, 3, x)
+    >>> x.tolist()
+    [2.0, 2.0, 2.0]
     """
     for r in range(first, last):
         row = factor[row_slice(r, r + 1)]
@@ -114,6 +180,13 @@ def _solve_two(x: Array, k: int, corner: tuple[float, ...], u_x: float, v_x: flo
 
     The corner of L holds 1/u_k, v_k and 1/v_k+1. u_x and v_x are the
     inner products of the rows with the first k entries of x.
+
+    Rows (..., 2) and (..., 3, 4) with the inner products 1 and 2 of the entries before:
+
+    >>> x = np.array([9.0, 7.0, 15.0])
+    >>> _solve_two.py_func(x, 1, (1 / 2.0, 3.0, 1 / 4.0), 1.0, 2.0)
+    >>> x.tolist()
+    [9.0, 3.0, 1.0]
     """
     x[k] = (x[k] - u_x) * corner[0]
     x[k + 1] = (x[k + 1] - v_x - corner[1] * x[k]) * corner[2]
@@ -166,7 +239,19 @@ def _forward_substitute_four(factor: Array, n_rows: int) -> None:
 
 @jit
 def back_substitute(factor: Array, n_rows: int, values: Array) -> None:
-    """Solve L' x = values in place, with four rows of L at a time."""
+    """Solve L' x = values in place, with four rows of L at a time.
+
+    >>> i = np.arange(7)
+    >>> L, rows = np.zeros(row_start(7)), np.tril(np.add.outer(2 * i, i) % 5 + 1.0)
+    >>> for r in i:
+    ...     L[row_start(r) : row_start(r) + r + 1] = rows[r, : r + 1]
+    >>> for n in (3, 7):
+    ...     x = i[:n] + 1.0
+    ...     back_substitute(L, n, x)
+    ...     print(np.allclose(rows[:n, :n].T @ x, i[:n] + 1.0))
+    True
+    True
+    """
     i = n_rows
     while i >= 4:
         i -= 4
@@ -389,7 +474,18 @@ def factor_slipping(workspace: Workspace) -> int:
 def substitute_slipping(
     workspace: Workspace, first: int, last: int, values: Array, Linv_values: Array
 ) -> None:
-    """Extend L^-1 times a field with `values` at the nodes by the rows first..last-1."""
+    """Extend L^-1 times a field with `values` at the nodes by the rows first..last-1.
+
+    With L as in `forward_substitute`, only row 2 is new, and its node is 7:
+
+    >>> from types import SimpleNamespace
+    >>> L = np.zeros(24)
+    >>> L[16:19] = 3.0, 1.0, 5.0
+    >>> workspace, x = SimpleNamespace(factor=L, slipping=np.array([4, 5, 7])), np.full(3, 2.0)
+    >>> substitute_slipping.py_func(workspace, 2, 3, np.arange(11.0, 19.0), x)
+    >>> x.tolist()
+    [2.0, 2.0, 2.0]
+    """
     for r in range(first, last):
         Linv_values[r] = values[workspace.slipping[r]]
     forward_substitute(workspace.factor, first, last, Linv_values)
@@ -433,7 +529,19 @@ def apply_stiffness_to_resting_slip(state: SlipState) -> None:
 
 @jit_inside
 def solve_slip(workspace: Workspace, n_slipping: int, load: float, slip: Array) -> None:
-    """Solve A_SS d = load p - q for the slip in S, given L^-1 p and L^-1 q."""
+    """Solve A_SS d = load p - q for the slip in S, given L^-1 p and L^-1 q.
+
+    With L = ((2), (1, 4)), L' d = 3 L^-1 p - L^-1 q = (4, 8):
+
+    >>> from types import SimpleNamespace
+    >>> L, d = np.zeros(24), np.zeros(3)
+    >>> L[0], L[8:10] = 2.0, (1.0, 4.0)
+    >>> Linv_p, Linv_q = np.array([2.0, 3.0, 9.0]), np.array([2.0, 1.0, 9.0])
+    >>> workspace = SimpleNamespace(factor=L, Linv_p=Linv_p, Linv_q=Linv_q)
+    >>> solve_slip.py_func(workspace, 2, 3.0, d)
+    >>> d.tolist()
+    [1.0, 2.0, 0.0]
+    """
     for t in range(n_slipping):
         slip[t] = load * workspace.Linv_p[t] - workspace.Linv_q[t]
     back_substitute(workspace.factor, n_slipping, slip)
@@ -441,7 +549,17 @@ def solve_slip(workspace: Workspace, n_slipping: int, load: float, slip: Array) 
 
 @jit_inside
 def solve_v(workspace: Workspace, n_slipping: int, v: Array) -> None:
-    """Solve A_SS v = p for the rates of slip with the load in S, given L^-1 p."""
+    """Solve A_SS v = p for the rates of slip with the load in S, given L^-1 p.
+
+    With L = ((2), (1, 4)), L' v = L^-1 p = (4, 8):
+
+    >>> from types import SimpleNamespace
+    >>> L, v = np.zeros(24), np.zeros(3)
+    >>> L[0], L[8:10] = 2.0, (1.0, 4.0)
+    >>> solve_v.py_func(SimpleNamespace(factor=L, Linv_p=np.array([4.0, 8.0, 9.0])), 2, v)
+    >>> v.tolist()
+    [1.0, 2.0, 0.0]
+    """
     for t in range(n_slipping):
         v[t] = workspace.Linv_p[t]
     back_substitute(workspace.factor, n_slipping, v)
@@ -449,7 +567,14 @@ def solve_v(workspace: Workspace, n_slipping: int, v: Array) -> None:
 
 @jit_inside
 def write_clipped(workspace: Workspace, n_slipping: int, values: Array, field: Array) -> None:
-    """Write values in S, clipped at zero, to a field (n,) that is zero at the other nodes."""
+    """Write values in S, clipped at zero, to a field (n,) that is zero at the other nodes.
+
+    >>> from types import SimpleNamespace
+    >>> workspace, field = SimpleNamespace(slipping=np.array([3, 1, 0])), np.full(4, 9.0)
+    >>> write_clipped.py_func(workspace, 2, np.array([5.0, -2.0, 7.0]), field)
+    >>> field.tolist()
+    [0.0, 0.0, 0.0, 5.0]
+    """
     for i in range(field.shape[0]):
         field[i] = 0.0
     for t in range(n_slipping):

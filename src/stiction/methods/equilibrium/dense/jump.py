@@ -123,7 +123,20 @@ class StepEnd(NamedTuple):
 
 @jit_inside
 def _residual_runs(sample: StaticSample, slip: Array) -> tuple[int, int]:
-    """Return the longest run of residual nodes on the circle, and the number of passed corners."""
+    """Return the longest run of residual nodes on the circle, and the number of passed corners.
+
+    Nodes 5, 0 and 1 are residual in a row across the border, and node 3. Node 2
+    has passed a corner. A node that cannot weaken does not count before it slips:
+
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> pieces = LINEAR._replace(ends=np.array([0.25, 1.0]))
+    >>> sample = make_sample(np.full(6, 3.0), *np.ones((3, 6)), pieces)
+    >>> runs = jit(lambda sample, slip: _residual_runs(sample, slip))
+    >>> runs(sample, np.array([2.0, 3.0, 0.6, 2.0, 0.4, 9.0])), runs(sample, np.full(6, 2.0))
+    ((3, 9), (6, 12))
+    >>> runs(sample._replace(critical=np.zeros(6)), np.zeros(6))
+    (0, 0)
+    """
     n, longest, run, n_corners = slip.shape[0], 0, 0, 0
     for q in range(2 * n):  # twice around, so that a run across the first node is complete
         i = q if q < n else q - n
@@ -154,7 +167,21 @@ def _join(state: SlipState, load: float, n_slipping: int, tolerance: float) -> S
 
 @jit_inside
 def _remove_unloaded(state: SlipState, n_slipping: int, tolerance: float) -> int:
-    """Step 1: unmark the nodes that an elastic step would move back. Return the number left."""
+    """Step 1: unmark the nodes that an elastic step would move back. Return the number left.
+
+    Back steps are 0.1 x 2 and 0.1 x 4 Pa at the nodes 2 and 0, and the allowance is 0.3 Pa:
+
+    >>> from types import SimpleNamespace
+    >>> workspace = SimpleNamespace(
+    ...     slipping=np.array([2, 0, 1]), solution=np.array([0.4, 0.2, 0.6]),
+    ...     diagonal=np.array([4.0, 9.0, 2.0]), is_slipping=np.ones(3, dtype=bool),
+    ... )
+    >>> state = SimpleNamespace(workspace=workspace, slip=np.array([0.3, 0.5, 0.5]))
+    >>> _remove_unloaded.py_func(state, 3, 0.3 / MAX_MARGIN_AT_STRENGTH)
+    2
+    >>> workspace.is_slipping.tolist()
+    [False, True, True]
+    """
     workspace, n_stay = state.workspace, n_slipping
     for t in range(n_slipping):
         i = workspace.slipping[t]
@@ -306,6 +333,43 @@ def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspa
     If `unstoppable` nodes in a row are at their residual strength, the
     interface slides. `true_pieces` holds the factor of K - diag(W), with
     the slopes W of the present pieces of the law.
+
+    Twelve nodes pass corners of two pieces and come to rest where (1) holds,
+    also if K has positive entries:
+
+    >>> from stiction.elasticity.protocol import DenseEntries
+    >>> from stiction.methods.equilibrium.dense.cholesky import make_workspace
+    >>> from stiction.methods.equilibrium.strength import Pieces, make_sample, present_pieces
+    >>> n, i, ends = 12, np.arange(12), np.array([0.3, 1.0])
+    >>> flat = Pieces(ends, np.array([1, 4 / 7, 0]), np.array([1, 2 / 7, 0]), 2.0, 0.35)
+    >>> excess, p = 3.0 + np.sin(0.9 * i) + np.cos(1.7 * i), 1.0 + 0.2 * np.cos(2.0 * i)
+    >>> def rest(load, W, may_stop=False, unstoppable=np.inf, relief=0.1):
+    ...     distance = np.abs(np.subtract.outer(i, i))
+    ...     K = -0.6 * (np.cos(distance) if may_stop else 1.0) / (1.0 + distance)
+    ...     K[i, i] = 3.0
+    ...     sample = make_sample(excess, excess - 1.5, p, W + 0.2 * np.sin(i), flat)
+    ...     entries = DenseEntries(K.ravel(), n, relief)
+    ...     elastic, true_pieces = (make_workspace(entries, n) for _ in range(2))
+    ...     slip = np.where(load * p > excess, 1e-3, 0.0)
+    ...     state = SlipState(sample, slip, K @ slip, elastic, may_stop, True)
+    ...     outcome = jump(state, load, unstoppable, true_pieces)
+    ...     piece, strength, W = present_pieces(sample, slip)
+    ...     over = load * p - K @ slip - strength + W * slip
+    ...     slips = true_pieces.is_slipping
+    ...     holds = over.max() < 1e-8, np.abs(over[slips]).max() < 1e-8
+    ...     return Outcome(outcome).name, *map(bool, holds), int(piece.max())
+    >>> rest(2.5, 2.4), rest(3.5, 2.4)
+    (('ARRESTED', True, True, 1), ('ARRESTED', True, True, 2))
+    >>> rest(3.5, 0.6), rest(3.5, 2.4, True)
+    (('ARRESTED', True, True, 0), ('ARRESTED', True, True, 2))
+
+    Three residual nodes lie in a row. The interface slides if that many
+    cannot be stopped, or if its mean strength cannot carry a dead load:
+
+    >>> [rest(3.5, 2.4, unstoppable=nodes)[0] for nodes in (3, 4)]
+    ['SLIDING', 'ARRESTED']
+    >>> rest(3.5, 2.4, relief=0.0)[0]
+    'SLIDING'
     """
     sample, slip, _, workspace, _, _ = state
     n = slip.shape[0]

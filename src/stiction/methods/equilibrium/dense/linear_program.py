@@ -89,7 +89,17 @@ MAX_PASSES = 10_000
 
 @jit_inside
 def sort_by(keys: Array, nodes: NDArray[np.int64], count: int) -> None:
-    """Sort nodes[:count] by rising keys[:count], both in place (Shell sort, Ciura's gaps)."""
+    """Sort nodes[:count] by rising keys[:count], both in place (Shell sort, Ciura's gaps).
+
+    >>> keys, nodes = np.array([3.0, -1.0, 2.0, 0.5, -9.0]), np.arange(10, 15)
+    >>> sort_by.py_func(keys, nodes, 4)
+    >>> keys.tolist(), nodes.tolist()
+    ([-1.0, 0.5, 2.0, 3.0, -9.0], [11, 13, 12, 10, 14])
+    >>> keys = (7.0 * np.arange(41)) % 41
+    >>> sort_by.py_func(keys, np.arange(41), 41)
+    >>> keys.tolist() == list(range(41))
+    True
+    """
     for gap in (1750, 701, 301, 132, 57, 23, 10, 4, 1):
         for i in range(gap, count):
             key, node, j = keys[i], nodes[i], i
@@ -129,7 +139,17 @@ def queue_overstressed(state: SlipState, load: float, tolerance: float) -> int:
 
 @jit_inside
 def stress_tolerance(sample: StaticSample, load: float) -> float:
-    """Return the overstress, Pa, that counts as round-off."""
+    """Return the overstress, Pa, that counts as round-off.
+
+    |-2| + 3 x 0.5 and 4 + 3 x 1 add up to 10.5 Pa. One of the three nodes
+    cannot break:
+
+    >>> from types import SimpleNamespace
+    >>> excess, profile = np.array([-2.0, np.inf, 4.0]), np.array([0.5, 7.0, 1.0])
+    >>> sample = SimpleNamespace(excess=excess, profile=profile)
+    >>> round(float(stress_tolerance.py_func(sample, -3.0)) * 1e12, 6)
+    3.5
+    """
     # Nodes with infinite strength, which cannot break, do not count.
     total, n = 0.0, sample.excess.shape[0]
     for i in range(n):
@@ -226,6 +246,35 @@ def solve_program(
     `cap` is below the solution, the result is the least equilibrium at
     the load `cap`. The problem is not solved if there are too many
     passes, or more slipping nodes than the workspace can hold.
+
+    For 30 nodes, `linprog` solves (1) as well. Searches begin below or above
+    the solution, end at a cap, and go on from there:
+
+    >>> from scipy.optimize import linprog
+    >>> from stiction.elasticity.protocol import DenseEntries
+    >>> from stiction.methods.equilibrium.dense.cholesky import make_workspace
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> n, i = 30, np.arange(30)
+    >>> K = -1.0 / (1.0 + np.abs(np.subtract.outer(i, i))) ** 2
+    >>> K -= np.diag(K.sum(axis=1) - 0.02)
+    >>> W, p = 0.7 + 0.2 * np.sin(i), 1.0 + 0.1 * np.cos(2.0 * i)
+    >>> excess = 3.0 + np.sin(0.9 * i) + np.cos(1.7 * i)
+    >>> sample = make_sample(excess, excess - 90.0, p, W, LINEAR)
+    >>> exact = -linprog(-np.eye(n + 1)[0], np.column_stack((p, np.diag(W) - K)), excess).fun
+    >>> def solve(start, cap=np.inf, slip=0.0):
+    ...     slip, (Kd, y, Ky) = slip + np.zeros(n), np.zeros((3, n))
+    ...     workspace = make_workspace(DenseEntries(K.ravel(), n, 0.0), n)
+    ...     state = SlipState(sample, slip, Kd, workspace, False)
+    ...     load, solved = solve_program(state, start, np.inf if cap < np.inf else 4.0, cap, y)
+    ...     overload = load * p - K @ slip - excess + W * slip
+    ...     gap = certificate(sample, slip, Kd, y, workspace, Ky) if cap == np.inf else 0.0
+    ...     good = overload.max() < 1e-9, np.abs(overload[slip > 0]).max() < 1e-9, gap < 1e-9
+    ...     return round(load / exact, 9), solved, *map(bool, good), slip
+    >>> solve(0.5)[:5], solve(9.0)[:5]
+    ((1.0, True, True, True, True), (1.0, True, True, True, True))
+    >>> *capped, known = solve(0.5, 0.95 * exact)
+    >>> capped, solve(0.95 * exact, slip=known)[:5]
+    ([0.95, True, True, True, True], (1.0, True, True, True, True))
     """
     sample, slip, Kd, workspace, _, _ = state
     top = min(bound, cap)
@@ -298,6 +347,21 @@ def certificate(
     """Return the distance between rigorous bounds, Pa: (1) from slip, (2) from the multiplier y.
 
     Writes K y to `Ky`.
+
+    With y = (1, 0.5, 0) and W = 1 Pa/m, K y = (1.5, 0, -1.5). The upper bound
+    is (2 + 1.5 + 0.5 x 0.25)/1.5 Pa, because (A y)_0 is 0.5 Pa and d_0 is 0.25
+    m. The lower bound is 2 + 0.25 Pa:
+
+    >>> from stiction.elasticity.protocol import DenseEntries
+    >>> from stiction.methods.equilibrium.dense.cholesky import make_workspace
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> K = np.array([[2.0, -1, -1], [-1, 2, -1], [-1, -1, 2]])
+    >>> sample = make_sample(np.array([2.0, 3, 4]), np.zeros(3), np.ones(3), np.ones(3), LINEAR)
+    >>> slip, y = np.array([0.25, 0, 0]), np.array([1.0, 0.5, 0.0])
+    >>> workspace, Ky = make_workspace(DenseEntries(K.ravel(), 3, 0.0), 3), np.zeros(3)
+    >>> gap = certificate(sample, slip, K @ slip, y, workspace, Ky)
+    >>> round(gap - (3.625 / 1.5 - 2.25), 9), Ky.tolist()
+    (0.0, [1.5, 0.0, -1.5])
     """
     n, lower, excess_y, count = slip.shape[0], np.inf, 0.0, ZERO
     # The load of (1) is the least balance over load profile, for any slip.

@@ -79,6 +79,15 @@ def block_factor(column: Array, width: int) -> Array:
     column, from two vectors in `width`^2 operations (the algorithm of
     Schur; T. Kailath and A. Sayed, Fast Reliable Algorithms for
     Matrices with Structure, 1999, chapter 1).
+
+    The factor of a Toeplitz block, row by row, as numpy finds it from the whole block:
+
+    >>> column = 6.0 / (1.0 + np.arange(12)) ** 2 * np.where(np.arange(12) > 0, -1.0, 1.0)
+    >>> block = column[np.abs(np.subtract.outer(np.arange(11), np.arange(11)))]
+    >>> factor, L = block_factor(column, 11), np.linalg.cholesky(block)
+    >>> rows = [factor[row_start(r) : row_start(r) + r + 1] for r in range(11)]
+    >>> all(np.allclose(row, L[r, : r + 1]) for r, row in enumerate(rows))
+    True
     """
     factor = np.empty(row_start(width + 4))
     starts = np.array([row_start(r) for r in range(width)])
@@ -109,7 +118,14 @@ class Runs(NamedTuple):
 
 @lru_cache(maxsize=4)
 def runs_of(half_spaces: HalfSpaces, nodes: int) -> Runs:
-    """Return the properties of a line that the test needs."""
+    """Return the properties of a line that the test needs.
+
+    >>> runs = runs_of(HalfSpaces((2.0,), (5.0,)), 16)
+    >>> runs.longest, runs.spacing, runs.modulus, runs.wide_column.size
+    (15, 0.125, 5.0, 48)
+    >>> runs.wide_column[16:32].tolist() == runs.wide_column[:16].tolist()
+    True
+    """
     (length,), (modulus,) = half_spaces
     column = line_of(half_spaces, nodes).entries.column
     longest = min(MAX_RUN, nodes - 1)
@@ -126,6 +142,18 @@ def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
     d_c times the area under the law. A crack of half-length a releases
     pi a D^2/(2 G*) at each tip. The length is infinite if a node has no
     stress drop.
+
+    The least stress drop is 2 x 1.5 - 1 Pa at node 0, and the largest energy
+    0.5 x 3 x 2 J/m² at node 1. The length is 4 x 5 x 3/(pi 2^2) m, divided by
+    0.125 m:
+
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> rows = np.array([[2.0, 4.0, np.inf], [1.0, 1.0, 2.9], [1.5, 2, 1], [1.0, 1.5, 1]])
+    >>> sample, runs = make_sample(*rows, LINEAR), Runs(np.zeros(1), np.zeros(1), 15, 0.125, 5.0)
+    >>> round(unstoppable_length(sample, 2.0, runs) * np.pi, 6)
+    120.0
+    >>> unstoppable_length(sample, 2 / 3, runs)
+    inf
     """
     stress_drop, energy = np.inf, 0.0
     for i in range(sample.excess.shape[0]):
@@ -149,6 +177,35 @@ def runs_away(
     proves sliding in `jump`. Slip d, K d, the direction z of the
     instability and K z belong to the instability. After the call, slip
     is a lower bound of the least equilibrium.
+
+    A patch at the border of 64 equal nodes slides, and 1.5 times Griffith's
+    length is 6 x 5 x 0.00675/(pi 0.8^2) m. Without a corner nothing stops it:
+
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> runs, i = runs_of(HalfSpaces((2.0,), (5.0,)), 64), (np.arange(64) + 31) % 64 - 31
+    >>> K = runs.wide_column[np.abs(np.subtract.outer(np.arange(64), np.arange(64)))]
+    >>> def outcome(weak, strong, z, W=60.0):
+    ...     excess, slip = np.where((i > -2) & (i < weak), 1.0, strong), np.zeros(64)
+    ...     rows = excess, np.full(64, 0.1), np.ones(64), np.full(64, W)
+    ...     sample = make_sample(*rows, LINEAR)
+    ...     found, length = runs_away(sample, runs, 0.9, slip, np.zeros(64), z, K @ z)
+    ...     return Outcome(found).name, round(length / 32, 6), slip
+    >>> z = np.maximum(1.0 - np.abs(i) / 6.0, 0.0)
+    >>> outcome(99, 1.0, z)[:2] == ("SLIDING", round(30 * 0.00675 / np.pi / 0.64, 6))
+    True
+    >>> outcome(99, 1.0, 0.0 * z)[0]
+    'SLIDING'
+
+    Strong nodes stop the patch, so that K d = 0.9 - 0.1 on its four nodes. Their
+    fracture energy is 2.9^2/600 J/m²:
+
+    >>> patch = (i > -2) & (i < 3)
+    >>> found, length, slip = outcome(3, 3.0, 1.0 * patch, 300.0)
+    >>> found, length == round(30 * 2.9**2 / 600 / np.pi / 0.64, 6)
+    ('UNDECIDED', True)
+    >>> rest = np.linalg.solve(K[np.ix_(patch, patch)], np.full(4, 0.8))
+    >>> bool(np.allclose(slip[patch], rest, rtol=2e-3)), int(np.count_nonzero(slip))
+    (True, 4)
     """
     n = slip.shape[0]
     griffith = unstoppable_length(sample, load, runs)

@@ -77,7 +77,32 @@ nodes at rest."""
 
 
 class DenseSearch:
-    """Thread-safe search for equilibria of a line or a specimen."""
+    """Thread-safe search for equilibria of a line or a specimen.
+
+    The first instability of a line is the solution of (1) in
+    `linear_program`, which `linprog` finds from the matrix:
+
+    >>> import stiction as st
+    >>> from scipy.optimize import linprog
+    >>> from stiction.methods.equilibrium.solver import sample_of
+    >>> solid, line, i = st.Solid(3e9, 0.35, 1180.0), st.Interface(0.4, 32), np.arange(32)
+    >>> strength = 1e6 * (3.0 + np.sin(0.9 * i) + 0.5 * np.cos(1.7 * i))
+    >>> problem = st.Problem(solid, line, st.LinearWeakening(1e11))
+    >>> dense = DenseSearch(problem)
+    >>> sample = sample_of(problem.sample(strength), dense.pieces, 0)
+    >>> onset = dense.next(sample)
+    >>> A = dense.elastic.block(i) - np.diag(sample.weakening_rate)
+    >>> limits = np.column_stack((np.ones(32), -A / 1e11))
+    >>> exact = -linprog(-np.eye(33)[0], limits, strength / 1e6).fun * 1e6
+    >>> round(onset.load / exact, 9), onset.certified, bool(onset.gap < 1e-9 * onset.load)
+    (1.0, True, True)
+    >>> dense.jump(sample, onset).outcome.name
+    'SLIDING'
+    >>> below = dense.at(sample, at_rest(sample), 0.97 * exact)
+    >>> over = below.load - below.Kd - strength + sample.weakening_rate * below.slip
+    >>> bool(over.max() < 1.0), bool(np.abs(over[below.slip > 0]).max() < 1.0)
+    (True, True)
+    """
 
     widest_gap = 1e-9
     """Certificate gap, as a fraction of the load, above which there is
@@ -241,7 +266,20 @@ class DenseSearch:
         return solution
 
     def _first_piece(self, sample: StaticSample) -> StaticSample:
-        """Return the linear sample of the first piece, which is flat if the law has a plateau."""
+        """Return the linear sample of the first piece, which is flat if the law has a plateau.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+        >>> rows = np.array([[3.0, 2], [1.0, 1], [1, 1], [2.0, 2]])
+        >>> plateau = np.array([0.0, 1.0, 0.0])
+        >>> ends, starts = np.array([0.2, 1.0]), np.array([1.0, 1.25, 0.0])
+        >>> for pieces in (LINEAR, LINEAR._replace(ends=ends, starts=starts, slopes=plateau)):
+        ...     search = SimpleNamespace(pieces=pieces, nodes=2)
+        ...     first = DenseSearch._first_piece(search, make_sample(*rows, pieces))
+        ...     print(first.weakening_rate)
+        [2. 2.]
+        [0. 0.]
+        """
         if self.pieces.slopes[0] > 0.0:
             return sample
         return present_sample(sample, np.zeros(self.nodes))
@@ -257,6 +295,37 @@ class DenseSearch:
     def at(
         self, sample: StaticSample, state: EquilibriumState, load: float
     ) -> EquilibriumState | None:
+        """Return the equilibrium at a load above a state, or `None` if it is not found.
+
+        From rest, a programme that ends at the load comes first, unless a node
+        passes a corner:
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+        >>> sample = make_sample(*np.array([[1.0, 2], [0.0, 0], [1, 1], [2.0, 2]]), LINEAR)
+        >>> def state(slip, status=PathStatus.STABLE, **more):
+        ...     slip = np.array([slip, 0.0])
+        ...     return EquilibriumState(1.0, slip, 0.0 * slip, status=status, **more)
+        >>> search = SimpleNamespace(
+        ...     driven=False, _first_piece=lambda sample: sample,
+        ...     solve=lambda sample, cap: state(by_programme),
+        ...     next=lambda sample, start, cap: state(0.3, status, route=start.route),
+        ... )
+        >>> status, by_programme, start = PathStatus.STABLE, 0.2, state(0.0)
+        >>> def at(start, load=3.0):
+        ...     found = DenseSearch.at(search, sample, start, load)
+        ...     return found and (found.load, float(found.slip[0]), found.route.name)
+        >>> at(start), at(start, 1.0)
+        ((3.0, 0.2, 'PROGRAMME_FROM_REST'), (1.0, 0.0, 'PROGRAMME_FROM_REST'))
+        >>> at(state(0.0, route=Route.PROGRAMME))
+        (1.0, 0.3, 'EVENTS')
+        >>> by_programme = 0.6  # beyond the corner at 0.5 m
+        >>> at(start)
+        (1.0, 0.3, 'EVENTS')
+        >>> status = PathStatus.UNSTABLE
+        >>> at(start) is None
+        True
+        """
         if load <= state.load:
             return state
         # From rest, a programme that ends at
@@ -336,6 +405,29 @@ class DenseSearch:
         1/(n <p>) and 1 on these nodes. The derivative is then
 
             y - <c, d'> y + (K - W)^-1 c.
+
+        Node 0 slips with K - W = 4 - 1.5 Pa/m, so d' = (0.4, 0). A machine has
+        r = 5 Pa/m and n = 2. If the interface ends, c is (0.3, 0.2):
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+        >>> sample = make_sample(*np.array([[1.0, 2], [0.0, 0], [1, 3], [1.5, 2]]), LINEAR)
+        >>> state = EquilibriumState(1.0, np.array([0.1, 0.0]), np.array([1.0, 2.0]))
+        >>> K = np.array([[4.0, -1.0], [-1.0, 4.0]])
+        >>> elastic = SimpleNamespace(relief=5.0, block=lambda nodes: K[np.ix_(nodes, nodes)])
+        >>> search = SimpleNamespace(driven=False, ends=False, elastic=elastic)
+        >>> DenseSearch.gradient(search, sample, state).round(6).tolist()  # y = z/<p, z>
+        [0.142857, 0.285714]
+        >>> search.driven = True
+        >>> y, rate = np.array([1.0, 2.0]) / 7.0, np.array([0.4, 0.0])
+        >>> expected = y - 2.5 * (0.4 * y - rate)
+        >>> bool(np.allclose(DenseSearch.gradient(search, sample, state), expected))
+        True
+        >>> search.problem = SimpleNamespace(relief_of_nodes=np.array([0.3, 0.2]))
+        >>> search.ends = True
+        >>> expected = (1.0 - 0.3 * 0.4) * y + [0.3 / 2.5, 0.0]
+        >>> bool(np.allclose(DenseSearch.gradient(search, sample, state), expected))
+        True
         """
         y = multiplier_of(sample, state)
         if not (self.driven or self.ends):
@@ -361,6 +453,14 @@ def present_sample(sample: StaticSample, slip: Array) -> StaticSample:
 
     `excess` and `weakening_rate` belong to these pieces, continued to
     zero slip. The law has no further effect.
+
+    Node 0 is residual, with 1 Pa, and node 1 has not slipped:
+
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> rows = np.array([[3.0, 2], [1.0, 0.5], [1, 1], [2.0, 4]])
+    >>> present = present_sample(make_sample(*rows, LINEAR), np.array([1.5, 0.0]))
+    >>> present.excess.tolist(), present.weakening_rate.tolist(), present.residual.tolist()
+    ([1.0, 2.0], [0.0, 4.0], [1.0, 0.5])
     """
     present = present_pieces(sample, slip)
     return sample._replace(excess=present.strength, weakening_rate=present.weakening_rate)
@@ -370,6 +470,13 @@ def _range_of_weakening_rates(sample: StaticSample) -> tuple[float, float]:
     """Return the lowest and the highest non-zero weakening rate, or zeros if all rates are zero.
 
     Rates that differ only by round-off are returned as equal.
+
+    >>> from types import SimpleNamespace
+    >>> for W in ([0.0, 3.0, 2.0, 5.0], [0.0, 3.0, 3.0 + 1e-12], [0.0, 0.0]):
+    ...     print(_range_of_weakening_rates(SimpleNamespace(weakening_rate=np.array(W))))
+    (2.0, 5.0)
+    (3.0, 3.0)
+    (0.0, 0.0)
     """
     weakening_rates = sample.weakening_rate[sample.weakening_rate > 0.0]
     if weakening_rates.size == 0:

@@ -187,6 +187,27 @@ def _first_to_stop(
 
     Rates move from `v_nodes` to `new` (in S), or, if `endless`, along
     `new` without end.
+
+    Rates in S, at the nodes 3, 1 and 0, move from (4, 6, 5) to (2, -2, -5).
+    Node 0 stops at half the way, before node 1. Along (0.5, -4, -2) without
+    end, node 1 stops first:
+
+    >>> from types import SimpleNamespace
+    >>> state = SimpleNamespace(workspace=SimpleNamespace(slipping=np.array([3, 1, 0])))
+    >>> v_nodes = np.array([5.0, 6.0, 9.0, 4.0])
+    >>> new = np.array([2.0, -2, -5])
+    >>> position, share = _first_to_stop.py_func(state, 3, v_nodes, new, False)
+    >>> position, float(share)
+    (2, 0.5)
+    >>> new = np.array([0.5, -4, -2])
+    >>> position, share = _first_to_stop.py_func(state, 3, v_nodes, new, True)
+    >>> position, float(share)
+    (1, 1.5)
+    >>> resting = np.zeros(4)  # the node that reverses fastest stops first
+    >>> _first_to_stop.py_func(state, 3, resting, np.array([-1.0, -3, -2]), True)[0]
+    1
+    >>> _first_to_stop.py_func(state, 3, v_nodes, np.array([2.0, -1e-11, 5]), False)
+    (-1, inf)
     """
     slipping, largest = state.workspace.slipping, 0.0
     for t in range(n_slipping):
@@ -207,7 +228,20 @@ def _first_to_stop(
 def _move_v(
     state: SlipState, n_slipping: int, v_nodes: Array, new: Array, share: float, endless: bool
 ) -> None:
-    """Move the rates by a fraction of the way to `new` (in S). See `_first_to_stop`."""
+    """Move the rates by a fraction of the way to `new` (in S). See `_first_to_stop`.
+
+    Rates at the nodes 3 and 1 go half the way from 4 and 6 to 2 and -9, or half
+    2 and -9 further:
+
+    >>> from types import SimpleNamespace
+    >>> state = SimpleNamespace(workspace=SimpleNamespace(slipping=np.array([3, 1, 0])))
+    >>> for endless in (False, True):
+    ...     v_nodes = np.array([5.0, 6.0, 9.0, 4.0])
+    ...     _move_v.py_func(state, 2, v_nodes, np.array([2.0, -9.0]), 0.5, endless)
+    ...     print(v_nodes.tolist())
+    [5.0, 0.0, 9.0, 3.0]
+    [5.0, 1.5, 9.0, 5.0]
+    """
     slipping = state.workspace.slipping
     for t in range(n_slipping):
         i = slipping[t]
@@ -268,7 +302,31 @@ def _refresh(state: SlipState, load: float, n_slipping: int) -> None:
 def _next_event(
     state: SlipState, load: float, target: float, piece: NDArray[np.int64], n_slipping: int
 ) -> PathEvent:
-    """Step 3: return the first event on the way to the target."""
+    """Step 3: return the first event on the way to the target.
+
+    Node 0 slips and reaches its corner, 0.4 m, after 0.3/2 Pa. Node 1 starts
+    after 0.6/(1 - 0.25) Pa, and the margin at node 2 opens:
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> pieces = LINEAR._replace(ends=np.array([0.1, 1.0]))
+    >>> rows = np.array([[5.0, 2.0, 2.0], [1.0] * 3, [1.0] * 3, [1.0] * 3])
+    >>> sample, (slip, Kd) = make_sample(*rows, pieces), np.array([[0.1, 0, 0], [0, -0.4, 0]])
+    >>> workspace = SimpleNamespace(
+    ...     is_slipping=np.array([True, False, False]), Kv=np.array([0.0, 0.25, 1.5]),
+    ...     slipping=np.zeros(3, int), v=np.array([2.0]),
+    ... )
+    >>> state, piece = SlipState(sample, slip, Kd, workspace, False), np.zeros(3, int)
+    >>> def event(target, first_piece=0):
+    ...     piece[0] = first_piece
+    ...     step, starting_node, corner = _next_event.py_func(state, 1.0, target, piece, 1)
+    ...     return round(float(step), 6), starting_node, corner
+    >>> event(1.1), event(9.0), event(9.0, 1), event(9.0, 2)
+    ((0.1, -1, -1), (0.15, -1, 0), (0.8, 1, -1), (0.8, 1, -1))
+    >>> workspace.v[0] = 5.0  # the second corner, 4 m, after 3.9/5 Pa
+    >>> event(9.0, 1), event(9.0, 2)
+    ((0.78, -1, 0), (0.8, 1, -1))
+    """
     sample, slip, Kd, workspace, _, _ = state
     p, corners = sample.profile, sample.pieces.ends
     step = target - load
@@ -316,7 +374,15 @@ def _move_along_z(state: SlipState, n_factored: int, v_nodes: Array, direction: 
 
 @jit_inside
 def _keep_factored(state: SlipState, n_factored: int, v_nodes: Array) -> None:
-    """Step 5 after a corner or the first factor: the nodes without a row in L leave S."""
+    """Step 5 after a corner or the first factor: the nodes without a row in L leave S.
+
+    >>> from types import SimpleNamespace
+    >>> marks, v_nodes = np.array([True, True, False, True]), np.array([1.0, 2.0, 3.0, 4.0])
+    >>> workspace = SimpleNamespace(slipping=np.array([3, 1, 0]), is_slipping=marks)
+    >>> _keep_factored.py_func(SimpleNamespace(workspace=workspace), 2, v_nodes)
+    >>> marks.tolist(), v_nodes.tolist()
+    ([False, True, False, True], [0.0, 2.0, 0.0, 4.0])
+    """
     slipping, is_slipping = state.workspace.slipping, state.workspace.is_slipping
     for i in range(v_nodes.shape[0]):
         is_slipping[i] = False
@@ -329,7 +395,14 @@ def _keep_factored(state: SlipState, n_factored: int, v_nodes: Array) -> None:
 
 @jit_inside
 def _some_rest(state: SlipState) -> bool:
-    """Return whether any node that slipped before rests."""
+    """Return whether any node that slipped before rests.
+
+    >>> from types import SimpleNamespace
+    >>> workspace = SimpleNamespace(is_slipping=np.array([True, False, False]))
+    >>> slips = np.array([0.2, 0.0, 0.0]), np.array([0.2, 0.0, 0.1])
+    >>> [_some_rest.py_func(SimpleNamespace(workspace=workspace, slip=slip)) for slip in slips]
+    [False, True]
+    """
     for i in range(state.slip.shape[0]):
         if state.slip[i] > 0.0 and not state.workspace.is_slipping[i]:
             return True
@@ -386,7 +459,19 @@ def _start(
 
 @jit_inside
 def ends_sliding(state: SlipState) -> bool:
-    """Return whether a path or jump ends because every node that can break has slipped."""
+    """Return whether a path or jump ends because every node that can break has slipped.
+
+    Node 1 slipped and rests, and node 2 cannot break:
+
+    >>> from types import SimpleNamespace
+    >>> sample = SimpleNamespace(excess=np.array([1.0, 2.0, np.inf]))
+    >>> workspace = SimpleNamespace(is_slipping=np.array([True, False, False]))
+    >>> state = SlipState(sample, np.array([0.0, 0.2, 0.0]), None, workspace, True)
+    >>> ends_sliding.py_func(state), ends_sliding.py_func(state._replace(goes_on=True))
+    (True, False)
+    >>> ends_sliding.py_func(state._replace(slip=np.zeros(3)))
+    False
+    """
     if state.goes_on:
         return False
     for i in range(state.slip.shape[0]):
@@ -404,6 +489,49 @@ def follow_stable_path(
 
     Slip and K d of the state are updated. If the path ends unstable,
     the direction (n,) in which slip jumps is written to `direction`.
+
+    Twelve nodes pass corners of two pieces, on paths that go on or become
+    unstable. At each target (1) holds, and A z <= 0. If K has positive
+    entries, nodes stop and rest below their strength:
+
+    >>> from stiction.elasticity.protocol import DenseEntries
+    >>> from stiction.methods.equilibrium.dense.cholesky import make_workspace
+    >>> from stiction.methods.equilibrium.strength import Pieces, make_sample, present_pieces
+    >>> n, i, ends = 12, np.arange(12), np.array([0.3, 1.0])
+    >>> steep = Pieces(ends, np.array([1, 10 / 9, 0]), np.array([1, 1.5, 0]), 20 / 27, 0.5)
+    >>> flat = Pieces(ends, np.array([1, 4 / 7, 0]), np.array([1, 2 / 7, 0]), 2.0, 0.35)
+    >>> excess, p = 3.0 + np.sin(0.9 * i) + np.cos(1.7 * i), 1.0 + 0.2 * np.cos(2.0 * i)
+    >>> def follow(coupling, W, pieces, may_stop=False):
+    ...     distance = np.abs(np.subtract.outer(i, i))
+    ...     K = -coupling * (np.cos(distance) if may_stop else 1.0) / (1.0 + distance)
+    ...     K[i, i] = 3.0
+    ...     sample = make_sample(excess, excess - 1.5, p, W + 0.2 * np.sin(i), pieces)
+    ...     workspace = make_workspace(DenseEntries(K.ravel(), n, 0.0), n)
+    ...     (slip, Kd, z), load, worst = np.zeros((3, n)), 0.9, 0.0
+    ...     state = SlipState(sample, slip, Kd, workspace, may_stop, True)
+    ...     for target in np.arange(1.0, 8.0, 0.5):
+    ...         end = follow_stable_path(state, load, target, z)
+    ...         load, (piece, strength, W) = end.load, present_pieces(sample, slip)
+    ...         over = load * p - K @ slip - strength + W * slip
+    ...         slips = (slip > 0.0) & (workspace.is_slipping | (not may_stop))
+    ...         worst = max(worst, *over, *np.abs(over[slips]), *np.abs(Kd - K @ slip))
+    ...         if end.status != PathStatus.STABLE:
+    ...             break
+    ...     Az, rest = K @ z - W * z, (slip > 0.0) & ~slips
+    ...     print(end.status.name, bool(worst < 1e-9), end.stopped, int(piece.max()))
+    ...     print(*(bool(value) for value in (Az.max() < 1e-9, z.any(), rest.any())))
+    >>> follow(0.3, 0.6, flat)
+    STABLE True False 1
+    True False False
+    >>> follow(0.5, 2.4, flat)
+    UNSTABLE True False 2
+    True True False
+    >>> follow(0.5, 1.6, steep)
+    UNSTABLE True False 2
+    True True False
+    >>> follow(0.7, 2.0, steep, True)
+    UNSTABLE True True 2
+    False True True
     """
     sample, slip, Kd, workspace, may_stop, _ = state
     n, n_corners = slip.shape[0], sample.pieces.ends.shape[0]
