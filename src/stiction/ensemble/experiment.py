@@ -124,6 +124,36 @@ class Experiment:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        """>>> import stiction as st
+        >>> solid, friction = (
+        ...     st.Solid(2e9, 0.2, 1200.0),
+        ...     st.LinearWeakening(weakening_rate=1e11),
+        ... )
+        >>> problem = st.Problem(
+        ...     solid, st.Interface(0.2, 64), friction, st.Load(initial_stress=1e5)
+        ... )
+        >>> def mistakes(*lengths, keep=(), **options):
+        ...     marginal = st.Lognormal(mean=2e6, cv=0.1)
+        ...     fields = [
+        ...         st.RandomField(marginal, st.SquaredExponentialSpectrum(length))
+        ...         for length in lengths
+        ...     ]
+        ...     members = [
+        ...         st.RandomInterface(strength=field, **{name: field for name in options})
+        ...         for field in fields
+        ...     ]
+        ...     try:
+        ...         Experiment(problem, members, st.LocalCriterion(), keep)
+        ...     except InputError as error:
+        ...         for text in error.problems:
+        ...             print(text[:70].strip())
+        >>> mistakes(0.016, 0.02, keep=["strength"])
+        >>> mistakes(0.016, 9.0, 9.0, keep=["strength", "slip"], initial_stress=True)
+        problem.load.initial_stress: has no effect together with random.initia
+        strength: spectrum: is truncated at 0.568 rad/m, below the first mode
+        initial_stress: spectrum: is truncated at 0.568 rad/m, below the first
+        keep: unknown 'slip' (valid: strength, initial_stress)
+        """
         random = as_random(self.random, self.seed)
         mistakes: dict[str, None] = {}  # equally likely interfaces repeat them
         for member in random.members:
@@ -205,7 +235,34 @@ class Experiment:
         return float(np.mean(means))
 
     def check_fields(self) -> None:
-        """Warn about fields that do not suit the grid, the interface or their units."""
+        """Warn about fields that do not suit the grid, the interface or their units.
+
+        >>> import stiction as st
+        >>> solid, friction = (
+        ...     st.Solid(2e9, 0.2, 1200.0),
+        ...     st.LinearWeakening(weakening_rate=1e11),
+        ... )
+        >>> problem = st.Problem(solid, st.Interface(0.2, 64), friction)
+        >>> def texts(mean, length, **fields):
+        ...     def field(mean, length):
+        ...         marginal, spectrum = (
+        ...             st.Lognormal(mean=mean, cv=0.1),
+        ...             st.SquaredExponentialSpectrum(length),
+        ...         )
+        ...         return st.RandomField(marginal, spectrum, mean_mode=True)
+        ...
+        ...     fields = {name: field(other, 0.016) for name, other in fields.items()}
+        ...     random = st.RandomInterface(strength=field(mean, length), **fields)
+        ...     with collect_warnings() as warned:
+        ...         Experiment(problem, random, st.LocalCriterion()).check_fields()
+        ...     return [str(text)[:64] for text in warned]
+        >>> texts(2e6, 0.016), texts(2e6, 0.016, residual_strength=1e6)
+        ([], [])
+        >>> texts(2e6, 9.0)
+        ['strength: its correlation length is so long that each sample is ']
+        >>> texts(2e6, 0.016, residual_strength=1.9e6)[0][-49:]
+        'of the nodes lie at or below the residual strengt'
+        """
         for member in self.random.members:
             member.warn_if_inaccurate(self.problem.interface)
             for name, field in member.properties.items():

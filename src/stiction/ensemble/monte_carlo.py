@@ -45,7 +45,25 @@ MAX_FAILED_FROM_START = 16
 
 
 def check_fields(points: Sequence[Experiment]) -> None:
-    """Warn once about each field that does not suit the grid, the interface or its unit."""
+    """Warn once about each field that does not suit the grid, the interface or its unit.
+
+    Each pair of a field and a problem is checked once, and one warning is
+    issued.
+
+    >>> from types import SimpleNamespace as Named
+    >>> from stiction.base.errors import collect_warnings
+    >>> checked_points, problem, a, b = [], Named(), Named(), Named()
+    >>> def point(random):
+    ...     def check():
+    ...         checked_points.append(random)
+    ...         warn_accuracy("coarse")
+    ...
+    ...     return Named(random=random, problem=problem, check_fields=check)
+    >>> with collect_warnings() as texts:
+    ...     check_fields([point(a), point(b), point(a)])
+    >>> checked_points == [a, b], len(checked_points), [str(text) for text in texts]
+    (True, 2, ['coarse'])
+    """
     with merge_warnings():
         for point in distinct(points, "random", "problem"):
             point.check_fields()
@@ -196,6 +214,51 @@ def gather(
     Finished samples go to the `store`. `elsewhere`, with shape (points,
     samples), marks samples that a different job computes. See
     `monte_carlo` for the other arguments.
+
+    Of eight samples, three are stored, one belongs to another job, and four
+    fail.
+
+    >>> from types import SimpleNamespace as Named
+    >>> import stiction as st
+    >>> from stiction.base.errors import collect_warnings
+    >>> from stiction.base.variables import Variable
+    >>> from stiction.ensemble.batches import Table
+    >>> def results(first, count):
+    ...     raise ArithmeticError("no root")
+    >>> point = Named(
+    ...     problem=Named(interface=st.Interface(0.1, 8)),
+    ...     method=Named(label="criterion"),
+    ...     random=0,
+    ...     variables={"critical_stress": Variable("Pa", "stress")},
+    ...     seed=9,
+    ...     batch=300,
+    ...     sample_bytes=8.0,
+    ...     seconds=1.0,
+    ...     results=results,
+    ...     batches=lambda *span: [span],
+    ...     prepare=lambda: None,
+    ...     check_fields=lambda: None,
+    ... )
+    >>> columns = {"_point": np.zeros(3, int), "_sample": np.array([0, 3, 4])}
+    >>> columns["critical_stress"] = np.array([5.0, 7.0, 6.0])
+    >>> notes = []
+    >>> store = Named(
+    ...     resume=lambda rows: rows.add(Table(columns, (), 0.0, "")),
+    ...     pilot={"pilot_bias": 0.5},
+    ...     add=lambda table: None,
+    ...     save=lambda: notes.append("saved"),
+    ... )
+    >>> elsewhere = np.arange(8) == 6
+    >>> with collect_warnings() as texts:
+    ...     found = gather(
+    ...         [point], 8, {"seed": 9}, store=store, elsewhere=elsewhere, progress=False
+    ...     )
+    >>> found.critical_stress.values.tolist()
+    [5.0, nan, nan, 7.0, 6.0, nan, nan, nan]
+    >>> found.attrs["pilot_bias"], found.attrs["cut_short"], notes
+    (0.5, '3 of 8 samples are done', ['saved'])
+    >>> [str(text).partition("NaN")[0] for text in texts], str(texts[0])[-11:]
+    (['4 of 8 samples could not be solved and are '], ' and 1 more')
     """
     rows, cores = Gathered(points, samples), workers or usable_cores()
     # Samples that are stored, or that another job computes, are not missing.

@@ -83,6 +83,50 @@ def _differences(
 
     The result is empty without an exact counterpart, or if the quick
     test leaves no doubt.
+
+    Samples 1 to 32 are the first with an onset, and samples 8 to 39 the
+    weakest. Their exact onsets are 1 lower, with the means 32.5 and 25.5.
+
+    >>> from types import SimpleNamespace as Named
+    >>> import stiction as st
+    >>> def experiment(differs, lower=0.0):
+    ...     problem = st.paper.problem(nodes=256)
+    ...
+    ...     def solve(draws):
+    ...         return {}, {"critical_stress": 50.0 - lower - draws[:, 0]}
+    ...
+    ...     return Named(
+    ...         problem=problem,
+    ...         solve=solve,
+    ...         profiles=lambda draws: draws,
+    ...         sample=lambda draws: draws,
+    ...         draws=lambda first, count: np.full((count, 1), float(first)),
+    ...         method=Named(exact_method="equilibrium", may_differ=differs),
+    ...         by=lambda exact: experiment(differs, 1.0),
+    ...     )
+    >>> onsets = 50.0 - np.arange(40.0)
+    >>> onsets[0] = np.nan
+    >>> def by_exact(problem, sample, stress):
+    ...     return stress[0] == 50.0 - sample[0, 0]
+    >>> found = _differences(experiment(by_exact), onsets, workers=1)
+    >>> [
+    ...     (name, part.size, np.unique((1.0 / part).round(9)).tolist())
+    ...     for name, part in found.items()
+    ... ]
+    [('pilot', 32, [32.5]), ('pilot_weakest', 32, [25.5])]
+    >>> _differences(experiment(lambda *given: False), onsets, 1)  # no doubt
+    {}
+    >>> found = _differences(experiment(by_exact), onsets[:9], 1)
+    >>> [(name, part.size) for name, part in found.items()]
+    [('pilot', 8)]
+    >>> _differences(experiment(by_exact), np.full(3, np.nan), 1)
+    {}
+    >>> found = _differences(experiment(by_exact), None, 1)  # samples 0 to 31
+    >>> [
+    ...     (name, part.size, np.unique((1.0 / part).round(9)).tolist())
+    ...     for name, part in found.items()
+    ... ]
+    [('pilot', 32, [33.5])]
     """
     problem, method = experiment.problem, experiment.method
     exact = exact_counterpart(problem, method)

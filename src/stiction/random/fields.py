@@ -160,6 +160,38 @@ class RandomField(Listed):
             Values at any places, in the field's unit. NaN is missing.
         noise : float
             Standard deviation of the measurement error, in this unit.
+
+        >>> import stiction as st
+        >>> import xarray as xr
+        >>> field = RandomField(
+        ...     st.Lognormal(mean=2e6, cv=0.2), st.SquaredExponentialSpectrum(0.05)
+        ... )
+        >>> def measured(units):
+        ...     return xr.DataArray(
+        ...         [1.5, 0.5], {"x": [0.01, 0.03]}, ("x",), attrs={"units": units}
+        ...     )
+        >>> known = field.given(measured("MPa"), noise=1e4)
+        >>> (
+        ...     known.conditions.values.tolist(),
+        ...     known.conditions.noise,
+        ...     known.marginal == field.marginal,
+        ... )
+        ([1500000.0, 500000.0], 10000.0, True)
+        >>> coefficient = dataclasses.replace(field, quantity="friction_coefficient")
+        >>> for one, units in (
+        ...     (field, "1"),
+        ...     (coefficient, "MPa"),
+        ...     (known, "MPa"),
+        ...     (coefficient, "%"),
+        ... ):
+        ...     try:
+        ...         print(one.given(measured(units), noise=1e4).conditions.values.tolist())
+        ...     except InputError as error:
+        ...         print(str(error)[:44])
+        profile: has the unit 1. Only a field with q
+        profile: has the unit MPa. Only a field with
+        profile: the field already has a profile. Co
+        [0.015, 0.005]
         """
         if self.conditions is not None:
             raise InputError("profile: the field already has a profile. Combine both profiles")
@@ -240,26 +272,32 @@ class RandomField(Listed):
     def warn_if_inaccurate(self, interface: Interface) -> None:
         """Warn if the grid is too coarse for the spectrum or the interface too short.
 
-        The modes 1 to 5 hold 5/15, 4/15, ..., 1/15 of the variance. Eight nodes
-        resolve four modes, and a mean mode would hold 3 / (3 + 15).
+        The modes 1 to 5 hold 3, 2, 1, 1 and 2 parts. Eight nodes resolve
+        four modes, and a mean mode would hold 2 / (2 + 9). To lose the last
+        mode, the spectrum would lose all modes with two parts or less.
 
         >>> import stiction as st
         >>> from stiction.base.errors import collect_warnings
-        >>> step = 2.0 * math.pi / 0.1
-        >>> spectrum = st.CustomSpectrum(lambda k: np.maximum(6.0 - k / step, 0.0), 5.5 * step)
-        >>> marginal = st.Lognormal(mean=2e6, cv=0.2)
-        >>> def warned(nodes, mean_mode):
+        >>> step, marginal = 2.0 * math.pi / 0.1, st.Lognormal(mean=2e6, cv=0.2)
+        >>> def warned(density, nodes, mean_mode):
+        ...     spectrum = st.CustomSpectrum(lambda k: density(k / step), 5.5 * step)
         ...     field = RandomField(marginal, spectrum, mean_mode=mean_mode)
         ...     with collect_warnings() as texts:
         ...         field.warn_if_inaccurate(Interface(0.1, nodes))
         ...     return [str(text) for text in texts]
-        >>> lost, short = warned(8, False)
+        >>> def parts(number):
+        ...     return np.abs(number - 3.5) + 0.5
+        >>> lost, short = warned(parts, 8, False)
         >>> lost[85:123], lost[148:]
-        ('6.67 % of the variance is not resolved', 'give interface.nodes >= 10 or power_kept=0.933')
+        ('22.2 % of the variance is not resolved', 'give interface.nodes >= 10 or power_kept=0.333')
         >>> short[:67]
-        'the field has no mean mode, which would hold 16.7 % of the variance'
-        >>> len(warned(8, True)), warned(10, True)
+        'the field has no mean mode, which would hold 18.2 % of the variance'
+        >>> len(warned(parts, 8, True)), warned(parts, 10, True)
         (1, [])
+        >>> def little_beyond(number):  # 0.5 % in mode 5
+        ...     return np.where(number < 1.5, 1000.0, np.where(number > 4.5, 5.0, 4.0))
+        >>> warned(little_beyond, 8, True)
+        []
         """
         modes = self.modes(interface)
         lost, short = modes.unresolved
@@ -373,7 +411,7 @@ def _pairs(value: Any) -> Any:
     Traceback (most recent call last):
     ...
     stiction.base.errors.InputError: must name two different properties, got 'strength'
-    >>> _pairs({("strength", "normal_pressure", "a"): 0.5})  # doctest: +ELLIPSIS
+    >>> _pairs({("strength", "normal_pressure", "strength"): 0.5})  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
     stiction.base.errors.InputError: must name two different properties, got ('strength', ...)
@@ -485,6 +523,51 @@ class RandomInterface(Listed):
 
     @model_validator(mode="after")
     def _consistent(self) -> RandomInterface:
+        """Refuse properties, correlations and factors that do not fit together.
+
+        >>> import scipy.stats
+        >>> import stiction as st
+        >>> field = RandomField(
+        ...     st.Lognormal(mean=2e6, cv=0.2), st.SquaredExponentialSpectrum(0.05)
+        ... )
+        >>> coefficient = dataclasses.replace(field, quantity="friction_coefficient")
+        >>> def mistakes(strength=field, between=None, **options):
+        ...     try:
+        ...         RandomInterface(strength=strength, between=between, **options)
+        ...     except InputError as error:
+        ...         for text in error.problems:
+        ...             print(text.removeprefix("RandomInterface: ")[:69])
+        >>> may = {"residual_strength": coefficient, "initial_stress": coefficient}
+        >>> mistakes(coefficient, **may, fracture_energy=field)
+        >>> mistakes(normal_pressure=coefficient, weakening_rate=field, fracture_energy=field)
+        normal_pressure: leave out quantity = 'friction_coefficient', which i
+        give one of weakening_rate, critical_slip, fracture_energy, got weake
+        >>> uniform = scipy.stats.uniform
+        >>> mistakes(
+        ...     between={
+        ...         "strength": uniform(0.0, 2.0),
+        ...         "pressing_force": uniform(0.5, 1.0 + 1e-6),
+        ...     }
+        ... )
+        >>> mistakes(
+        ...     between={"strength": uniform(-0.1, 2.2), "normal_pressure": uniform(0.5, 1.1)}
+        ... )
+        between.strength: a factor must be positive with mean 1, got mean 1 a
+        between.normal_pressure: a factor must be positive with mean 1, got m
+        >>> three = {"residual_strength": field, "initial_stress": field}
+        >>> rho = {"strength": {"residual_strength": 0.6, "initial_stress": 0.6}}
+        >>> mistakes(
+        ...     **three, correlation=rho | {"residual_strength": {"initial_stress": -0.28}}
+        ... )
+        >>> mistakes(
+        ...     **three, correlation=rho | {"residual_strength": {"initial_stress": -0.29}}
+        ... )
+        correlation: these coefficients contradict each other (their matrix i
+        >>> known = field.given({"x": [0.03], "values": [2e6]}, noise=1e4)
+        >>> mistakes(known, {"critical_slip": st.Lognormal(mean=1.0, cv=0.1)})
+        >>> mistakes(known, {"strength": st.Lognormal(mean=1.0, cv=0.1)})
+        between.strength: scatters between specimens, but strength.conditions
+        """
         problems = [
             f"{name}: leave out quantity = 'friction_coefficient', which is for stresses"
             for name, field in self.properties.items()
