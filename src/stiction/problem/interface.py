@@ -465,8 +465,8 @@ class Interface(Listed):
         """Periodic interface for random fields, twice as long if the ends are free.
 
         >>> free = Interface(8.0, 16, ends="free").embedding
-        >>> free.length, free.nodes, free.ends, Interface(8.0, 16).embedding.length
-        (16.0, 32, None, 8.0)
+        >>> free.length, free.nodes, free.is_free, Interface(8.0, 16).embedding.length
+        (16.0, 32, False, 8.0)
         """
         if not self.is_free:
             return self

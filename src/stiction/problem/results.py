@@ -103,8 +103,8 @@ def coordinate(interface: Interface, dim: str) -> tuple[NDArray[Any], Variable]:
 def as_text(attributes: Mapping[str, Any]) -> dict[str, Any]:
     """Return attributes other than strings and numbers as JSON.
 
-    >>> as_text({"seed": 3, "cv": 0.5, "note": "a", "sizes": [1, 2], "none": None})
-    {'seed': 3, 'cv': 0.5, 'note': 'a', 'sizes': '[1, 2]', 'none': 'null'}
+    >>> as_text({"seed": 3, "cv": 0.5, "note": "a", "sizes": [1, 2], "gap": None})
+    {'seed': 3, 'cv': 0.5, 'note': 'a', 'sizes': '[1, 2]', 'gap': 'null'}
     """
     return {
         name: value if isinstance(value, str | int | float) else json.dumps(value)

@@ -459,14 +459,15 @@ def check_values(name: str, array: Array, interface: Interface) -> None:
     ...         return check_values(name, np.array(values), Interface(8.0, 8))
     ...     except InputError as error:
     ...         return str(error)[:41]
-    >>> print(refusal("strength", -1e100, 1e100), refusal("residual_strength", 0.0, 3.0))
-    None None
+    >>> refusal("strength", -1e100, 1e100)
+    >>> refusal("residual_strength", 0.0, 3.0)
     >>> refusal("strength", 1.0, -1.1e100), refusal("initial_stress", np.nan)
     ('must be finite. Entry (1,) is -1.1e+100 (', 'must be finite. Entry (0,) is nan (at mos')
     >>> refusal("critical_slip", 2.0, 0.0), refusal("residual_strength", 1.0, -0.5)
     ('must be positive, got 0 m', 'must not be negative, got -0.5 Pa')
-    >>> refusal("friction_coefficient", 99.0, 100.0), refusal("friction_coefficient", 99.0, 101.0)
-    (None, 'its mean is 100. If it is a strength, use')
+    >>> refusal("friction_coefficient", 99.0, 100.0)
+    >>> refusal("friction_coefficient", 99.0, 101.0)
+    'its mean is 100. If it is a strength, use'
     >>> refusal("normal_pressure", [9.0] * 7 + [-62.0], [1.0] * 8)
     >>> refusal("normal_pressure", [1.0] * 8, [9.0] * 7 + [-63.0])
     'must be positive on average, but the mean'

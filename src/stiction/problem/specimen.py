@@ -261,9 +261,10 @@ class Blocks(Listed):
         ...     blocks = Blocks(height=0.05, thickness=0.004, drive=drive, pressing=pressing)
         ...     with patch("stiction.elasticity.driven.driven") as called:
         ...         _ = blocks.driven(0.3, 64, solid, "III" if pressing == "glued" else "II")
-        ...     print(*called.call_args.args)
-        0.3 64 0.05 1000000000.0 2.2 True None True 1500000000.0
-        0.3 64 0.05 1000000000.0 2.2 False None False inf
+        ...     *first, pushes, glued, machine = called.call_args.args
+        ...     print(*first, pushes is None, glued, machine)
+        0.3 64 0.05 1000000000.0 2.2 True True True 1500000000.0
+        0.3 64 0.05 1000000000.0 2.2 False True False inf
         """
         from stiction.elasticity.driven import driven  # scipy takes half a second
 

@@ -171,7 +171,7 @@ class Reading(NamedTuple):
 def is_coefficient_name(column: Column) -> bool:
     """Return whether the heading of a column names a friction coefficient, which has unit 1.
 
-    A force, or a coefficient whose role is a force or a travel, is none:
+    A force, or a coefficient whose role is a force or a travel, does not count:
 
     >>> names = "COF", "peak mu", "Reibzahl", "slip factor", "Shear Coeff.", chr(956) + "_max"
     >>> [is_coefficient_name(Column(name, "", None, 0)) for name in names]
