@@ -420,11 +420,11 @@ class Interface(Listed):
     def breakable_measure(self) -> float:
         """Length (m), or area on a plane (m²), of the nodes that can break.
 
-        >>> sides = (2.0, 4.0), (4.0, 12.0)  # 3 x 5 nodes
+        >>> sides = (4.0, 8.0), (6.0, 18.0)  # 3 x 5 nodes
         >>> for extent in (sides, None):
-        ...     print(float(Interface((8.0, 16.0), (8, 8), extent=extent).breakable_measure))
-        30.0
-        128.0
+        ...     print(float(Interface((16.0, 48.0), (8, 16), extent=extent).breakable_measure))
+        90.0
+        768.0
         """
         return np.count_nonzero(self.breakable) * self.cell if self.is_held else self.measure
 
@@ -511,11 +511,11 @@ class Interface(Listed):
     def cell(self) -> float:
         """Length (m), or area on a plane (m²), that a node represents.
 
-        >>> plane = Interface((8.0, 48.0), (8, 16))
+        >>> plane = Interface((16.0, 48.0), (8, 16))
         >>> plane.size, plane.measure, plane.cell, plane.spacings, plane.spacing
-        (128, 384.0, 3.0, (1.0, 3.0), 3.0)
+        (128, 768.0, 6.0, (2.0, 3.0), 3.0)
         >>> plane.lengths, plane.shape, plane.dims, plane.axes, plane.is_plane
-        ((8.0, 48.0), (8, 16), ('x', 'y'), (-2, -1), True)
+        ((16.0, 48.0), (8, 16), ('x', 'y'), (-2, -1), True)
         >>> line = Interface(8.0, 16)
         >>> line.lengths, line.shape, line.dims, line.axes, line.is_plane, line.size, line.cell
         ((8.0,), (16,), ('x',), (-1,), False, 16, 0.5)

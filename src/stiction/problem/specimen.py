@@ -521,7 +521,7 @@ class Slider(Listed):
         (0.01 x 8 + 1)/0.2:
 
         >>> from types import SimpleNamespace
-        >>> K = np.array([[10.0, -1.0], [-1.0, 8.0], [9.0, 0.2], [0.0, 0.0], [0.1, 9.0]])
+        >>> K = np.array([[10.0, -1.0], [-0.5, 8.0], [9.0, 0.2], [0.0, 0.0], [0.1, 9.0]])
         >>> rig = SimpleNamespace(K=K, T_p=np.array([7.0, 7.0, -0.1, -0.3, 0.1]))
         >>> slider = Slider(height=0.02, base=Base(height=0.03), drive=TopShear())
         >>> residual = np.array([[1.0, 8.0], [6.0, 3.8]])

@@ -408,9 +408,9 @@ def _cells_of(sheet: Any, size: int) -> list[Row]:
 
     >>> from types import SimpleNamespace
     >>> sheet = SimpleNamespace(reset_dimensions=lambda: None)
-    >>> sheet.iter_rows = lambda **given: iter([(1, None, " a "), (2.5,)])
+    >>> sheet.iter_rows = lambda **given: iter([(1, None, " a "), (2.5, 0)])
     >>> [(row.number, row.cells) for row in _cells_of(sheet, 10)]
-    [(1, ['1', '', 'a']), (2, ['2.5', '', ''])]
+    [(1, ['1', '', 'a']), (2, ['2.5', '0', ''])]
     >>> sheet.iter_rows = lambda **given: iter([(7,) * 2001])
     >>> _cells_of(sheet, 10)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
