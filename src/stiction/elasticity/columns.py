@@ -144,8 +144,10 @@ def elements(height: float, first: float, push: Interval | None = None) -> Eleme
     True
     >>> [round(float(np.abs(points - place).min()), 9) for place in (0.0, 0.5, 1.25, 2.0)]
     [0.0, 0.0, 0.0, 0.0]
-    >>> float(np.diff(points)[0]) < 0.03, elements(2.0, 0.3, (0.0, 2.0)).points.size
-    (True, 19)
+    >>> elements(2.0, 0.1, (0.5, 2.0)).points[:30:6].round(9).tolist()  # fine at both ends
+    [0.0, 0.1, 0.25, 0.4, 0.5]
+    >>> elements(2.0, 0.3, (0.0, 2.0)).points.size
+    19
     """
     # 1. An interval between two fine places is split in the middle.
     sizes: list[float] = []
@@ -398,6 +400,10 @@ def block(
     >>> short.shape, bool(np.linalg.eigvalsh(long - short).min() > -1e-9)
     ((7, 7), True)
     >>> bool(along @ long @ along > along @ short @ along > 1.0)
+    True
+    >>> mirror, signs = np.r_[2, 1, 0, 6, 5, 4, 3], np.r_[-1, -1, -1, 1, 1, 1, 1]
+    >>> other = block(body, 0.4, 3, far="fixed", behind=1.0, ahead=0.5)
+    >>> np.allclose(long[np.ix_(mirror, mirror)] * np.outer(signs, signs), other)
     True
 
     The leading end of a body on rollers has a wall. v is held at the bottom.

@@ -360,6 +360,8 @@ def _acceptable(poles: Complex, weights: Complex) -> bool:
     >>> close = np.array([-1.0 + 2.0j, -1.001 + 2.0j])  # two poles 0.001 apart nearly cancel
     >>> _acceptable(close, weights), _acceptable(close, 0.3 * weights)
     (False, True)
+    >>> _acceptable(np.array([-1.0, -1.003]), weights), _acceptable(np.array([-1.0, 0.5]), weights)
+    (True, False)
     """
     if np.abs(weights).max() > MAX_WEIGHT or poles.real.max() >= 0.0:
         return False

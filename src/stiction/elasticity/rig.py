@@ -110,6 +110,20 @@ def contact_rig(
     >>> bool(right.T[0] > right.T[2])  # more shear at the trailing end, which is pushed
     True
 
+    Equations (1) and (2):
+
+    >>> S, g, S_gg = loaded(block(slider, 0.4, 3, push=(0.1, 0.3)), 3, "soft", 0.0)
+    >>> signs = np.r_[1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0]
+    >>> below = block(base, 0.4, 3, far="fixed", behind=0.4, ahead=0.2)
+    >>> S_B = np.diag(signs) @ below @ np.diag(signs)
+    >>> reduced = np.linalg.solve(S + S_B, np.column_stack([S, g]))
+    >>> np.allclose(right.K, S_B @ reduced[:, :7])
+    True
+    >>> np.allclose(np.column_stack([right.T, right.T_p]), S_B @ reduced[:, 7:])
+    True
+    >>> round(float(1.0 / right.C - (g[:, 0] @ reduced[:, 7] - S_gg)), 9) + 0.0
+    0.0
+
     Rigid motions of the slider cause no force on the interface.
 
     >>> turn = np.r_[0.0, 0.0, 0.0, 0.0, 0.4, 0.8, 1.2]
@@ -162,6 +176,12 @@ def loaded(block: Array, n: int, pressing: str, tilt: float) -> tuple[Array, Arr
     >>> _, g, _ = loaded(pushed, 3, "soft", 0.3)
     >>> ((np.arange(4) - 1.5) * 0.4 @ -g[3:]).round(6).tolist()
     [0.375, 0.06]
+
+    A plate resists a rotation of the interface:
+
+    >>> turn = np.r_[0.0, 0.0, 0.0, 0.0, 0.4, 0.8, 1.2]
+    >>> bool(turn @ loaded(plain, 3, "plate", 0.0)[0] @ turn > 0.1)
+    True
     """
     size = 2 * n + 1
     whole = np.zeros((2 * size + 2, 2 * size + 2))

@@ -83,7 +83,14 @@ def apply_outside(
 def add_four(
     target: Array, strip: Array, places: tuple[int, int, int, int], values: tuple[float, ...]
 ) -> None:
-    """Add what four nodes contribute to half a product."""
+    """Add what four nodes contribute to half a product.
+
+    >>> import numpy as np
+    >>> target, strip = np.array([1.0, 2.0]), np.array([1.0, 10.0, 100.0, 1000.0, 5.0])
+    >>> add_four(target, strip, (0, 2, 1, 3), (1.0, 2.0, 3.0, 4.0))
+    >>> target.tolist()  # 1 + 1 + 200 + 30 + 4000, and 2 + 10 + 2000 + 300 + 20
+    [4232.0, 2332.0]
+    """
     half = target.shape[0]
     p0, p1, p2, p3 = places
     z0, z1, z2, z3 = values
@@ -103,7 +110,23 @@ def add_four(
 def apply_circular(
     K: CircularEntries, nodes: Array, count: int, values: Array, halves: Array, product: Array
 ) -> None:
-    """Multiply by K of a line, as `apply` does."""
+    """Multiply by K of a line, as `apply` does.
+
+    Slip at seven of 12 nodes, one of which is zero, and an eighth that does not count:
+
+    >>> import numpy as np
+    >>> from stiction.elasticity.line import stiffness_column
+    >>> column = stiffness_column(12, 1.0, 3.0)
+    >>> entries = CircularEntries(column, np.tile(column[1::2], 3))
+    >>> nodes = np.array([0, 11, 2, 4, 7, 6, 8, 10, 3])
+    >>> values = np.array([1.0, 2.0, 0.0, 3.0, 4.0, 5.0, 6.0, 7.0, 9.0])
+    >>> slip, product = np.zeros(12), np.empty(12)
+    >>> slip[nodes[:8]] = values[:8]
+    >>> apply_circular(entries, nodes, 8, values, np.empty((2, 6)), product)
+    >>> K = column[np.abs(np.subtract.outer(np.arange(12), np.arange(12)))]
+    >>> np.allclose(product, K @ slip)
+    True
+    """
     strip, half = K.strip, halves.shape[1]
     for parity in range(2):
         # 1.
@@ -142,7 +165,20 @@ def apply_circular(
 def _apply_rows(
     entries: DenseEntries, nodes: Array, count: int, values: Array, start: int, target: Array
 ) -> None:
-    """Write K times a field with `values` at `nodes`, from the node `start` on, to `target`."""
+    """Write K times a field with `values` at `nodes`, from the node `start` on, to `target`.
+
+    Slip at five of six nodes, from the node 2 on:
+
+    >>> import numpy as np
+    >>> K = np.arange(36.0).reshape(6, 6) ** 1.5
+    >>> K += K.T
+    >>> nodes, values = np.array([5, 0, 3, 1, 2, 4]), np.array([2.0, 3.0, 1.0, 5.0, 4.0, 9.0])
+    >>> slip, target = np.zeros(6), np.empty(3)
+    >>> slip[nodes[:5]] = values[:5]
+    >>> _apply_rows(DenseEntries(K.ravel(), 6, 0.0), nodes, 5, values, 2, target)
+    >>> np.allclose(target, (K @ slip)[2:5])
+    True
+    """
     n = entries.n_nodes
     for q in range(target.shape[0]):
         target[q] = 0.0
@@ -160,7 +196,18 @@ def _apply_rows(
 def _apply_rows_outside(
     K: DenseEntries, nodes: Array, count: int, values: Array, is_slipping: Array, product: Array
 ) -> None:
-    """Write K times a field at the nodes that do not slip, run by run."""
+    """Write K times a field at the nodes that do not slip, run by run.
+
+    >>> import numpy as np
+    >>> K = np.arange(36.0).reshape(6, 6) ** 1.5
+    >>> K += K.T
+    >>> nodes, values = np.array([1, 4]), np.array([3.0, -2.0])
+    >>> slip, product = np.array([0.0, 3.0, 0.0, 0.0, -2.0, 0.0]), np.full(6, np.nan)
+    >>> slips, entries = slip != 0.0, DenseEntries(K.ravel(), 6, 0.0)
+    >>> _apply_rows_outside(entries, nodes, 2, values, slips, product)
+    >>> np.allclose(product[~slips], (K @ slip)[~slips]), np.isnan(product[slips]).tolist()
+    (True, [True, True])
+    """
     # Runs of nodes at rest alternate with runs of slipping nodes, which
     # are skipped.
     end = ZERO
@@ -188,6 +235,15 @@ def _by_type(stub: Any, circular: Callable[..., Any], dense: Callable[..., Any])
 
 
 def _relief_of_rows(K, profile, slip):
+    """Return the relief of the load by slip in blocks, Pa.
+
+    >>> import numpy as np
+    >>> profile, slip = np.array([1.5, 0.5]), np.array([2.0, 4.0])
+    >>> float(_relief_of_rows(DenseEntries(profile, 2, 3.0), profile, slip))  # 3 * (3 + 2)/2
+    7.5
+    >>> _relief_of_rows(DenseEntries(profile, 2, 0.0), profile, slip)
+    0.0
+    """
     if K.relief == 0.0:
         return 0.0
     total = 0.0

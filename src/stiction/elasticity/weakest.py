@@ -75,6 +75,50 @@ def weakest_window(
 
     If no window gives a bound below `bound`, return `bound`,
     `NO_WINDOW` and 0. `allowed` (n,) is a workspace.
+
+    A window of two nodes with the weights 1/4 and 3/4 lies anywhere on six nodes, also
+    across the end. The lowest means are (4 + 3 * 1)/4 at node 3, (2 + 3 * 2)/4 at
+    node 5 and (2 + 3 * 4)/4 at node 2.
+
+    >>> import numpy as np
+    >>> def weakest(windows, W, profile=None, bound=9.0):
+    ...     excess, W = np.array([2.0, 9.0, 9.0, 4.0, 1.0, 2.0]), np.array(W, float)
+    ...     profile = np.ones(6) if profile is None else np.array(profile)
+    ...     return weakest_window(excess, profile, W, windows, bound, np.empty(6))
+    >>> def window(rates, starts, widths, modes):
+    ...     return Windows(np.array(rates), np.array(starts), np.array(widths), np.array(modes))
+    >>> pair = window([1.0], [-1], [2], [[0.25, 0.75]])
+    >>> weakest(pair, 6 * [1.0])
+    (1.75, 0, 3)
+    >>> weakest(pair, 6 * [1.0], bound=1.75), weakest(pair, 6 * [0.9])
+    ((1.75, -1, 0), (9.0, -1, 0))
+
+    If a node weakens too slowly, windows that hold it are left out. A profile divides.
+
+    >>> weakest(pair, [1.0, 1.0, 1.0, 1.0, 0.5, 1.0])
+    (2.0, 0, 5)
+    >>> weakest(pair, [1.0, 1.0, 1.0, 1.0, 0.5, 0.5])
+    (5.25, 0, 2)
+    >>> bound, _, start = weakest(pair, 6 * [1.0], [4.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    >>> round(bound, 6), start  # 8/4 over 13/4
+    (0.615385, 5)
+
+    Windows with fixed places have one mean each. Windows after one that is unstable
+    everywhere are not tried, unless they need the same rate.
+
+    >>> fixed = window([2.0, 1.0, 1.0, 0.5], [1, 3, 2, 4], [1, 2, 2, 1], 4 * [[0.5, 0.5]])
+    >>> weakest(fixed, 6 * [1.0])
+    (2.5, 1, 3)
+    >>> weakest(fixed, [1.0, 1.0, 1.0, 0.5, 1.0, 1.0])
+    (1.0, 3, 4)
+
+    A window of 32 nodes is tried at every second node, and then around the best place.
+
+    >>> excess = np.abs(np.arange(64.0) - 24.5) + 1.0
+    >>> wide = window([1.0], [-1], [32], [32 * [1.0 / 32]])
+    >>> ones = np.ones(64)
+    >>> weakest_window(excess, ones, ones, wide, 99.0, np.empty(64))[1:]  # 24.5 - 15.5
+    (0, 9)
     """
     n = W.shape[0]
     best, window, start = bound, NO_WINDOW, 0
@@ -139,6 +183,21 @@ def window_bound(
     Write its multiplier.
 
     The multiplier y (n,) has <p, y> = 1. `allowed` (n,) is a workspace.
+
+    Sliding as a whole gives the mean 3 of strengths 2, 3 and 4 under the load (1, 1, 1), and
+    9/6 under (1, 2, 3). A window across the end has 1/2 and 1/2.
+
+    >>> import numpy as np
+    >>> excess, one, y = np.array([2.0, 3.0, 4.0]), np.ones(3), np.empty(3)
+    >>> single = Windows(np.array([2.0]), np.array([-1]), np.array([2]), np.array([[1.0, 1.0]]))
+    >>> window_bound(excess, one, one, single, np.empty(3), y), (3 * y).round(9).tolist()
+    (3.0, [1.0, 1.0, 1.0])
+    >>> window_bound(excess, np.array([1.0, 2.0, 3.0]), one, single, np.empty(3), y)
+    1.5
+    >>> (6 * y).round(9).tolist()
+    [1.0, 1.0, 1.0]
+    >>> window_bound(np.array([1.0, 9.0, 2.0]), one, 2.0 * one, single, np.empty(3), y), y.tolist()
+    (1.5, [0.5, 0.0, 0.5])
     """
     n = W.shape[0]
     # 4.
