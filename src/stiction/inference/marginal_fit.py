@@ -243,6 +243,8 @@ class Family:
         [1.4, 2.2, 3.0, 5.4]
         >>> Family("beta", {"low": 1.5, "high": 5.0}).quiet(values, noise).round(9).tolist()
         [1.55, 2.2, 3.0, 4.95]
+        >>> Family("beta", {"low": 1.0, "high": 6.0}).quiet(values, 0.0).round(9).tolist()
+        [1.05, 2.0, 3.0, 5.95]
         >>> loud = Family("beta", {}).quiet(values, 9.0)
         >>> round(float(loud.var() / 3.5), 9)  # at least 5 % is left
         0.05
@@ -282,6 +284,8 @@ class Family:
         ([0.6, 6.6, 3.0, 1.2], [0.0, 9.0, 3.0, 2.0], [1.0, 6.6, 3.0, 1.2])
         >>> widened(Beta(alpha=2.0, beta=3.0, low=-1.0, high=4.0), 2.0)
         [-3.0, 7.0, 1.0, 2.0]
+        >>> widened(Beta(alpha=2.0, beta=3.0, low=0.0, high=5.0), 2.0)[0]
+        0.0
         >>> gamma = MARGINALS["gamma"](mean=5.0, cv=0.2, low=1.0)
         >>> found = Family("gamma", {"low": 1.0}).widened(gamma, 1.5)
         >>> found.mean, round(found.cv, 9), found.low
@@ -631,6 +635,9 @@ def climb(
     >>> best, _ = climb(start, narrow, value_of, derivatives, **options)
     >>> best.round(4).tolist()
     [1.25, 1.5]
+    >>> best, _ = climb(np.array([-9.0, 0.0]), narrow - 9.0, value_of, derivatives, **options)
+    >>> best.tolist()  # narrow - 9 is at most 0 and -7.5
+    [0.0, -7.5]
 
     Damping shortens steps if the information is far too small:
 
