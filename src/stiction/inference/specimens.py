@@ -117,12 +117,30 @@ the grid resolves."""
 
 @lru_cache(maxsize=1024)
 def factor_of_family(family: str, cv: float) -> Any:
-    """Return the marginal for a factor with mean 1."""
+    """Return the marginal for a factor with mean 1.
+
+    >>> factor = factor_of_family("weibull", 0.2).distribution
+    >>> round(float(factor.mean()), 9), round(float(factor.std()), 9)
+    (1.0, 0.2)
+    """
     return FACTOR_FAMILIES[family](mean=1.0, cv=cv)
 
 
 def families_of(given: Any) -> tuple[str, ...]:
-    """Return families of factors: all families if True, or else the named families."""
+    """Return families of factors: all families if True, or else the named families.
+
+    >>> families_of("weibull"), families_of(["weibull", "lognormal", "weibull"])
+    (('weibull',), ('weibull', 'lognormal'))
+    >>> families_of(True) == tuple(FACTOR_FAMILIES)
+    True
+    >>> for given in ([], 3):
+    ...     try:
+    ...         families_of(given)
+    ...     except InputError as error:
+    ...         print(str(error)[:12])
+    must be True
+    must be True
+    """
     names = (given,) if isinstance(given, str) else given
     names = tuple(FACTOR_FAMILIES) if given is True else names
     if not isinstance(names, list | tuple) or not names:
@@ -143,7 +161,19 @@ class FactorPrior(NamedTuple):
 
     @classmethod
     def of(cls, given: Any) -> Self:
-        """Return the prior, given a mapping from `MEAN_KEY` and `SCATTER_KEY` to distributions."""
+        """Return the prior, given a mapping from `MEAN_KEY` and `SCATTER_KEY` to distributions.
+
+        >>> prior = FactorPrior.of({"between": (0.1, 0.3), "mean": (1e6, 3e6)})
+        >>> [[float(end) for end in part.support()] for part in prior]
+        [[0.1, 0.3], [1000000.0, 3000000.0]]
+        >>> FactorPrior.of({"mean": (1e6, 3e6)}).scatter is FactorPrior().scatter
+        True
+        >>> FactorPrior.of({}).mean
+        >>> FactorPrior.of({"between": (0.9, 1.3)})  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ...
+        stiction.base.errors.InputError: prior: between: must be a coefficient of ...
+        """
         with prefixed("prior"):
             priors = {key: distribution_of(key, value) for key, value in given.items()}
         prior = cls(priors.get(SCATTER_KEY, cls().scatter), priors.get(MEAN_KEY))
@@ -155,7 +185,22 @@ class FactorPrior(NamedTuple):
         return prior
 
     def cells(self) -> Array:
-        """Return SCATTER_CELLS values of s at equal steps in prior probability."""
+        """Return SCATTER_CELLS values of s at equal steps in prior probability.
+
+        The steps have equal probability. Of a uniform prior from 0.7 to 1.1 only
+        the part up to 0.9 counts:
+
+        >>> cells = FactorPrior(scipy.stats.uniform(0.7, 0.4)).cells()
+        >>> cells.size, cells[[0, 1, -1]].round(4).tolist()
+        (40, [0.7025, 0.7075, 0.8975])
+        >>> cells = FactorPrior().cells()  # tan(pi/2 share) / 10, at least 0.002
+        >>> share = 2.0 / math.pi * math.atan(9.0)
+        >>> expected = [0.1 * math.tan(math.pi / 2.0 * share * (k + 0.5) / 40) for k in (1, 39)]
+        >>> (cells[[1, 39]] / expected).round(6).tolist()
+        [1.0, 1.0]
+        >>> float(cells[0])
+        0.002
+        """
         low, high = self.scatter.cdf([0.0, MOST_CV])
         shares = low + (high - low) * (np.arange(SCATTER_CELLS) + 0.5) / SCATTER_CELLS
         return np.maximum(self.scatter.ppf(shares), LEAST_CV)
@@ -174,7 +219,24 @@ class Profiles(NamedTuple):
 
     @classmethod
     def without_field(cls, problem: Problem, peaks: Peaks, **more: Any) -> Self:
-        """Return specimens with a uniform strength, a coefficient if there is a pressure."""
+        """Return specimens with a uniform strength, a coefficient if there is a pressure.
+
+        At a pressure of 2 MPa, a median of 0.7 MPa is a coefficient of 0.35. A
+        force divides by the area as well:
+
+        >>> import stiction as st
+        >>> problem = st.paper.problem(nodes=256)
+        >>> problem = replace(problem, interface=st.Interface(0.1, 256, width=0.02))
+        >>> pressed = replace(problem, load=st.Load(normal_pressure=2e6))
+        >>> def level(problem, *values, unit):
+        ...     peaks = Peaks((None,), (np.array(values),), unit)
+        ...     profiles = Profiles.without_field(problem, peaks)
+        ...     return round(profiles.reference, 9), profiles.fields[0].strength.quantity
+        >>> level(pressed, 0.6e6, 0.7e6, 0.9e6, unit="Pa"), level(pressed, 0.2, 0.35, 0.4, unit="1")
+        ((0.35, 'friction_coefficient'), (0.35, 'friction_coefficient'))
+        >>> [level(any_of, 1200.0, 1400.0, 1900.0, unit="N") for any_of in (pressed, problem)]
+        [(0.35, 'friction_coefficient'), (700000.0, None)]
+        """
         variable_of(problem, None, peaks.unit)  # checks it
         level, pressure = float(np.median(peaks.values[0])), problem.given_pressure
         if peaks.unit == "N":
@@ -193,12 +255,30 @@ class Profiles(NamedTuple):
 
     @property
     def stated(self) -> bool:
-        """Whether the field within a specimen was stated, not measured."""
+        """Whether the field within a specimen was stated, not measured.
+
+        >>> levels, fields = np.array([1.0, 2.0]), ("one", "two")
+        >>> counts = (1, 0), (1, 2), (2, 0), (2, 2)
+        >>> [Profiles(fields[:f], 1.0, levels[:k], None).stated for f, k in counts]
+        [True, False, False, False]
+        """
         return not self.levels.size and len(self.fields) == 1
 
 
 def of_mean(random: RandomInterface, mean: float, factor: Any = None) -> RandomInterface:
-    """Return a random interface with a different mean and a different factor of the strength."""
+    """Return a random interface with a different mean and a different factor of the strength.
+
+    >>> import stiction as st
+    >>> spectrum = st.PowerLawSpectrum(correlation_length=2e-3)
+    >>> field = st.RandomField(st.Beta(alpha=2.0, beta=2.0, low=1e6, high=3e6), spectrum)
+    >>> wide, narrow = st.Lognormal(mean=1.0, cv=0.3), st.Lognormal(mean=1.0, cv=0.1)
+    >>> both = st.RandomInterface(strength=field, between={"strength": wide})
+    >>> found = of_mean(both, 3e6, narrow)  # the mean was 2 MPa
+    >>> round(found.strength.marginal.low, 3), round(found.strength.marginal.high, 3)
+    (1500000.0, 4500000.0)
+    >>> found.between["strength"].cv, of_mean(both, 3e6).between
+    (0.1, None)
+    """
     factors = {k: v for k, v in (random.between or {}).items() if k != "strength"}
     between = factors | ({} if factor is None else {"strength": factor})
     field = random.strength
@@ -216,12 +296,47 @@ class Onsets:
     area: float = 1.0  # ratio of peaks and onsets
 
     def of(self, order: Any) -> Self:
-        """Return the onsets for the fields with given numbers."""
+        """Return the onsets for the fields with given numbers.
+
+        >>> ratios = np.arange(6.0).reshape(3, 1, 2)
+        >>> some = Onsets(np.zeros(1), ratios, ("a", "b", "c"), 4.0).of([2, 0])
+        >>> some.ratios.tolist(), some.densities, some.area
+        ([[[4.0, 5.0]], [[0.0, 1.0]]], ('c', 'a'), 4.0)
+        >>> Onsets(np.zeros(1), ratios, ()).of([1]).densities
+        ()
+        """
         densities = tuple(self.densities[k] for k in order) if self.densities else ()
         return replace(self, ratios=self.ratios[order], densities=densities)
 
     def tabulated(self, field: int, peaks: Array, error: float, x: Array) -> Array:
-        """Return the log density (peaks, points) of each peak at x for a field."""
+        """Return the log density (peaks, points) of each peak at x for a field.
+
+        Uniform fields slide at T(c) = 2 c, or at 4 c if log c is 1, with an area 3.
+        The error 0.6 is 5 % of the peak 12, and the peak 30 is known to 2 %:
+
+        >>> peaks, x = np.array([12.0, 30.0]), np.array([0.5, 0.7])
+        >>> onsets = Onsets(np.array([0.0]), np.array([[[1.0]], [[2.0]]]), (), 3.0)
+        >>> found = onsets.tabulated(1, peaks, 0.6, x)
+        >>> logs = scipy.stats.norm.logpdf(np.log(peaks / 6.0)[:, None] - x, 0.0, [[0.05], [0.02]])
+        >>> expected = logs - np.log(peaks)[:, None] + 0.5 * math.log(2.0 * math.pi)
+        >>> bool(np.allclose(found, expected))
+        True
+        >>> rising = Onsets(np.array([0.0, 1.0]), np.array([[[2.0], [4.0]]]), (), 3.0)
+        >>> away = math.log(12.0 / 6.0) - 0.5 - 0.5 * math.log(2.0)
+        >>> found = float(rising.tabulated(0, peaks, 0.6, x)[0, 0])
+        >>> round(found + 0.5 * (away / 0.05) ** 2 + math.log(0.6), 9)
+        0.0
+
+        With densities, a peak 6 T c at c = e^x has the density of T over 6 c:
+
+        >>> z = scipy.stats.norm.ppf((np.arange(4000) + 0.5) / 4000)[None]
+        >>> known = densities_of(np.exp(0.1 * z), np.zeros(1))
+        >>> onsets = Onsets(np.zeros(1), np.exp(0.1 * z)[None], (known,), 6.0)
+        >>> found = onsets.tabulated(0, np.array([12.0]), 0.0, x)
+        >>> expected = scipy.stats.lognorm(0.1, 0.0, 6.0 * np.exp(x)).logpdf(12.0)
+        >>> np.abs(found[0] - expected).round(1).tolist()
+        [0.0, 0.0]
+        """
         if not self.densities:  # uniform fields: peaks scatter by their error alone
             deviation = np.maximum(error / peaks, LEAST_DEVIATION)[:, None]
             onsets = np.log(self.area * self.ratios[field].mean(axis=1))
@@ -235,7 +350,24 @@ class Onsets:
         return out.T
 
     def ranges(self, peaks: Array, error: float) -> tuple[float, float, float]:
-        """Return the range of x to tabulate for these peaks, and the smallest deviation of x."""
+        """Return the range of x to tabulate for these peaks, and the smallest deviation of x.
+
+        Onsets 1 and 4 times the strength with an area 3, and peaks 12 and 30. Their
+        logarithms lie log 2 from their mean:
+
+        >>> ratios, peaks = np.array([[[1.0, 4.0]]]), np.array([12.0, 30.0])
+        >>> low, high, deviation = Onsets(np.zeros(1), ratios, ("density",), 3.0).ranges(peaks, 0.6)
+        >>> away = 6.0 * math.hypot(math.log(2.0), 0.6 / 12.0)
+        >>> ends = math.log(12.0 / 12.0) - away, math.log(30.0 / 3.0) + away
+        >>> bool(np.allclose([low, high], ends))
+        True
+        >>> round(deviation / math.log(2.0), 9)
+        1.0
+        >>> low, high, deviation = Onsets(np.zeros(1), ratios[..., :1], (), 3.0).ranges(peaks, 0.6)
+        >>> aside = low - math.log(4.0), high - math.log(10.0)
+        >>> [round(float(part), 9) for part in (*aside, deviation)]
+        [-0.3, 0.3, 0.02]
+        """
         # x = log y - log(T(c) over c/reference), by which fields and samples scatter.
         logs = np.log(self.area * self.ratios)
         deviation = max(float(logs.std(axis=2).min()), LEAST_DEVIATION)
@@ -248,7 +380,14 @@ class Onsets:
 
 
 def points_between(ranges: Sequence[tuple[float, float, float]]) -> Array:
-    """Return points x over all ranges, spaced by a quarter of the smallest deviation."""
+    """Return points x over all ranges, spaced by a quarter of the smallest deviation.
+
+    >>> x = points_between([(0.0, 1.0, 0.1), (-1.0, 0.5, 0.05)])  # 4 x 2/0.05
+    >>> x.size, x[[0, -1]].tolist()
+    (160, [-1.0, 1.0])
+    >>> points_between([(0.0, 1.0, 0.1)]).size, points_between([(0.0, 1.0, 1e-6)]).size
+    (64, 2000)
+    """
     lows, highs, deviations = zip(*ranges, strict=True)
     # A coarser grid would lose the narrowest likelihood between two
     # points.
@@ -259,7 +398,15 @@ def points_between(ranges: Sequence[tuple[float, float, float]]) -> Array:
 
 @lru_cache(maxsize=1024)
 def _tabulated(family: str, cv: float) -> tuple[Array, Array]:
-    """Return values of log b, dense near the mean, and the probability below each value."""
+    """Return values of log b, dense near the mean, and the probability below each value.
+
+    >>> logs, below = _tabulated("lognormal", 0.2)
+    >>> logs.size, logs[[0, 1200, -1]].round(9).tolist()
+    (2401, [-6.0, 0.0, 6.0])
+    >>> s = math.sqrt(math.log(1.04))
+    >>> bool(np.allclose(below, scipy.stats.norm.cdf(logs, -0.5 * s**2, s)))
+    True
+    """
     end = math.asinh(LOWEST_FACTOR / cv)
     logs = cv * np.sinh(np.linspace(-end, end, TABULATED))
     with np.errstate(over="ignore"):  # powers of values far above the mean
@@ -267,7 +414,17 @@ def _tabulated(family: str, cv: float) -> tuple[Array, Array]:
 
 
 def masses(family: str, cv: float, means: Array, x: Array) -> Array:
-    """Return the probability (means, points) that x lies in the cell of each point."""
+    """Return the probability (means, points) that x lies in the cell of each point.
+
+    The cell of -0.2 begins at -0.25, and its logarithm of the mean is 0 or 0.1:
+
+    >>> x = np.linspace(-0.2, 0.3, 6)
+    >>> found = masses("lognormal", 0.2, np.array([0.0, 0.1]), x)
+    >>> s, ends = math.sqrt(math.log(1.04)), np.linspace(-0.25, 0.35, 7)
+    >>> expected = np.diff([scipy.stats.norm.cdf(ends, m - 0.5 * s**2, s) for m in (0.0, 0.1)])
+    >>> bool(np.allclose(found, expected, atol=1e-5))
+    True
+    """
     half = 0.5 * (x[1] - x[0])
     ends = np.append(x - half, x[-1] + half)
     return np.diff(np.interp(ends - means[:, None], *_tabulated(family, cv)), axis=1)
@@ -284,12 +441,44 @@ class FactorGrid:
 
     @property
     def families(self) -> dict[str, float]:
-        """Posterior probability for each distribution between specimens."""
+        """Posterior probability for each distribution between specimens.
+
+        >>> profiles = Profiles((None, None), 1.0, np.zeros(0), None, ("weibull", "normal"))
+        >>> mass = np.zeros((2, 2, 40, 3))
+        >>> mass[0, 1, 7, 2], mass[1, 1, 9, 0], mass[1, 0, 0, 0] = 0.5, 0.2, 0.3
+        >>> FactorGrid(profiles, np.array([0.0, 0.5, 1.0]), mass).families
+        {'weibull': 0.3, 'normal': 0.7}
+        """
         masses = self.mass.sum(axis=(0, 2, 3)).tolist()
         return dict(zip(self.profiles.families, masses, strict=True))
 
     def draws(self, count: int, rng: np.random.Generator, fields: Any = None) -> Array:
-        """Draw field, family, s and log m, as (count, 4), also for given `fields`."""
+        """Draw field, family, s and log m, as (count, 4), also for given `fields`.
+
+        >>> profiles = Profiles((None, None), 1.0, np.zeros(0), None, ("weibull", "normal"))
+        >>> mass = np.zeros((2, 2, 40, 3))
+        >>> mass[0, 1, 7, 2], mass[1, 0, 9, 0] = 0.75, 0.25
+        >>> grid = FactorGrid(profiles, np.array([0.0, 0.5, 1.0]), mass)
+        >>> drawn = grid.draws(4000, np.random.default_rng(0))
+        >>> first = drawn[:, 0] == 0
+        >>> cells = profiles.prior.cells()
+        >>> bool(0.72 < first.mean() < 0.78), np.unique(drawn[first, 1]).tolist()
+        (True, [1.0])
+        >>> bool(np.all(drawn[first, 2] == cells[7])), np.unique(drawn[~first, 1]).tolist()
+        (True, [0.0])
+        >>> ends = drawn[first, 3].min(), drawn[first, 3].max()  # within half a step of 1
+        >>> [round(float(end), 2) for end in ends]
+        [0.75, 1.25]
+
+        Draws for given fields, and the same draws in a longer list:
+
+        >>> fields = [1, 0, 1]
+        >>> given = grid.draws(3, np.random.default_rng(0), fields)
+        >>> given[:, 0].tolist(), bool(np.allclose(given[:, 2], cells[[9, 7, 9]]))
+        ([1.0, 0.0, 1.0], True)
+        >>> bool(np.allclose(drawn[:7], grid.draws(7, np.random.default_rng(0))))
+        True
+        """
         # Two streams, so that draw number i is the same in a longer list.
         cells, (rng, mean_rng) = self.mass[0].size, rng.spawn(2)
         if fields is None:
@@ -306,14 +495,48 @@ class FactorGrid:
         return np.stack([field, family, self.profiles.prior.cells()[cell], logs], axis=1)
 
     def interface(self, drawn: Array) -> RandomInterface:
-        """Return the random interface for a draw (4,)."""
+        """Return the random interface for a draw (4,).
+
+        >>> import stiction as st
+        >>> spectrum = st.PowerLawSpectrum(correlation_length=2e-3)
+        >>> marginals = st.Lognormal(mean=2e6, cv=0.1), st.Lognormal(mean=2e6, cv=0.3)
+        >>> fields = [st.RandomInterface(strength=st.RandomField(marginal, spectrum))
+        ...           for marginal in marginals]
+        >>> profiles = Profiles(tuple(fields), 2e6, np.zeros(0), None, ("weibull", "normal"))
+        >>> drawn = np.array([1.0, 0.0, 0.2, math.log(1.5)])
+        >>> found = FactorGrid(profiles, None, None).interface(drawn)
+        >>> found.strength.marginal.cv, round(found.strength.mean, 3)
+        (0.3, 3000000.0)
+        >>> factor = found.between["strength"]
+        >>> type(factor).__name__, round(factor.cv, 9), round(factor.mean, 9)
+        ('Weibull', 0.2, 1.0)
+        """
         (field, family), profiles = drawn[:2].astype(int), self.profiles
         factor = factor_of_family(profiles.families[family], float(drawn[2]))
         mean = profiles.reference * math.exp(drawn[3])
         return of_mean(profiles.fields[field], mean, factor)
 
     def described(self, drawn: Array) -> dict[str, Array]:
-        """Return parameters by name from draws (draws, 4)."""
+        """Return parameters by name from draws (draws, 4).
+
+        >>> import stiction as st
+        >>> spectra = [st.PowerLawSpectrum(correlation_length=length) for length in (2e-3, 5e-3)]
+        >>> marginals = st.Lognormal(mean=2e6, cv=0.1), st.Lognormal(mean=2e6, cv=0.3)
+        >>> fields = [st.RandomInterface(strength=st.RandomField(*both))
+        ...           for both in zip(marginals, spectra)]
+        >>> drawn = np.array([[1.0, 0.0, 0.2, math.log(1.5)], [0.0, 1.0, 0.3, 0.0]])
+        >>> profiles = Profiles(tuple(fields), 2e6, np.ones(2), None)
+        >>> found = FactorGrid(profiles, None, None).described(drawn)
+        >>> found["mean"].round(3).tolist(), found["between"].tolist()
+        ([3000000.0, 2000000.0], [0.2, 0.3])
+        >>> found["standard_deviation"].round(3).tolist()  # 0.3 x 3 MPa and 0.1 x 2 MPa
+        [900000.0, 200000.0]
+        >>> bool(np.allclose(found["efolding_length"], [s.efolding_length for s in spectra[::-1]]))
+        True
+        >>> stated = profiles._replace(fields=profiles.fields[:1], levels=np.zeros(0))
+        >>> sorted(FactorGrid(stated, None, None).described(drawn[1:]))
+        ['between', 'mean']
+        """
         field, scale = drawn[:, 0].astype(np.int64), np.exp(drawn[:, 3])
         strengths = [one.strength for one in self.profiles.fields]
         deviations = np.array([one.standard_deviation for one in strengths])
@@ -330,7 +553,44 @@ class FactorGrid:
 def grid_of_profiles(
     profiles: Profiles, tables: "Tables | None" = None
 ) -> tuple[FactorGrid, FactorGrid]:
-    """Return two posteriors: from profiles alone, and from profiles and peaks (steps 2 to 5)."""
+    """Return two posteriors: from profiles alone, and from profiles and peaks (steps 2 to 5).
+
+    If the scatter is known, 0.2, and levels have no error, their logarithms are
+    normal around log m - s²/2, and log m is normal with the deviation
+    s/sqrt(3):
+
+    >>> levels = np.array([1.1, 0.8, 1.3])
+    >>> prior = FactorPrior(scipy.stats.uniform(0.2, 1e-9))
+    >>> profiles = Profiles((None,), 2.0, 2.0 * levels, np.zeros((1, 3)), ("lognormal",), prior)
+    >>> before, after = grid_of_profiles(profiles)
+    >>> s, mass = math.sqrt(math.log(1.04)), before.mass.sum(axis=(0, 1, 2))
+    >>> mean = float(mass @ before.means)
+    >>> round(mean - float(np.log(levels).mean() + 0.5 * s**2), 3) + 0.0
+    0.0
+    >>> round(math.sqrt(float(mass @ (before.means - mean) ** 2)) / s * math.sqrt(3.0), 2)
+    1.0
+    >>> bool(np.allclose(before.mass, after.mass))
+    True
+
+    The field within a specimen adds its variance to the logarithm of a level,
+    and lowers it by half of it. A prior of the mean is a density of m:
+
+    >>> wide = profiles._replace(levels=2.0 * levels[:1], within=np.full((1, 1), 0.03))
+    >>> grid = grid_of_profiles(wide)[0]
+    >>> mass, means = grid.mass.sum(axis=(0, 1, 2)), grid.means
+    >>> mean = float(mass @ means)
+    >>> round(mean - (math.log(1.1) + 0.015 + 0.5 * s**2), 2) + 0.0
+    0.0
+    >>> round(math.sqrt(float(mass @ (means - mean) ** 2) / (s**2 + 0.03)), 2)
+    1.0
+    >>> narrow = prior._replace(mean=scipy.stats.lognorm(0.05, 0.0, 2.6))
+    >>> grid = grid_of_profiles(wide._replace(prior=narrow))[0]
+    >>> mass = grid.mass.sum(axis=(0, 1, 2))
+    >>> precisions = np.array([1.0 / (s**2 + 0.03), 1.0 / 0.05**2])
+    >>> both = np.array([math.log(1.1) + 0.015 + 0.5 * s**2, math.log(1.3)])
+    >>> round(float(mass @ grid.means) - float(precisions @ both / precisions.sum()), 3) + 0.0
+    0.0
+    """
     # The logarithm of a level lies below log(m b) by half its variance
     # on average.
     levels = np.log(profiles.levels / profiles.reference) + 0.5 * profiles.within
@@ -386,6 +646,20 @@ def _products(kernel: Array, tables: Array) -> Array:
 
     `tables` holds the log likelihoods (fields, numbers, points) of the
     numbers at x (steps 3 and 4).
+
+    The means have the weights (1/4, 3/4) and (1, 0) of two points. Two numbers
+    have likelihoods at these points. In the last field they are extremely small:
+
+    >>> kernel = np.array([[[[0.25, 0.75], [1.0, 0.0]]]])
+    >>> tables = np.log([[[2.0, 6.0], [3.0, 5.0]], [[1e-300, 3e-300], [4.0, 8.0]]])
+    >>> found = _products(kernel, tables)
+    >>> found.shape, np.exp(found[0]).round(6).tolist()  # (0.5 + 4.5) (0.75 + 3.75), 2 x 3
+    ((2, 1, 1, 2), [[[22.5, 6.0]]])
+    >>> np.exp(found[1] + 300.0 * math.log(10.0)).round(6).tolist()  # 2.5 x 7, 1 x 4
+    [[[17.5, 4.0]]]
+    >>> far = np.array([[[-2000.0, -1001.0], [0.0, 0.0]]])
+    >>> round(float(_products(kernel, far)[0, 0, 0, 0] - math.log(0.75)), 6)
+    -1001.0
     """
     flat = kernel.reshape(-1, kernel.shape[-1]).T
     total = np.zeros((len(tables), flat.shape[1]))
@@ -408,16 +682,44 @@ class Tables:
     peaks: tuple[Array, ...]
 
     def of(self, peaks: Sequence[Array], kinds: Sequence[int]) -> Self:
-        """Return the tables for other peaks of some specimen types."""
+        """Return the tables for other peaks of some specimen types.
+
+        >>> some = Tables(None, None, ("a", "b", "c"), 0.1, ()).of(["x", "y"], [2, 0])
+        >>> some.onsets, some.peaks, some.error
+        (('c', 'a'), ('x', 'y'), 0.1)
+        """
         return replace(self, peaks=tuple(peaks), onsets=tuple(self.onsets[k] for k in kinds))
 
     def ranges(self) -> list[tuple[float, float, float]]:
-        """Return the range of x to tabulate for each kind."""
+        """Return the range of x to tabulate for each kind.
+
+        A kind without peaks has no range:
+
+        >>> onsets = Onsets(np.zeros(1), np.array([[[1.0]]]), (), 3.0)
+        >>> peaks = np.array([]), np.array([12.0, 30.0])
+        >>> tables = Tables(None, None, (onsets, onsets), 0.6, peaks)
+        >>> tables.ranges() == [onsets.ranges(peaks[1], 0.6)]
+        True
+        """
         pairs = zip(self.onsets, self.peaks, strict=True)
         return [kind.ranges(peaks, self.error) for kind, peaks in pairs if peaks.size]
 
     def of_field(self, field: int, x: Array) -> Array:
-        """Return log likelihoods (peaks, points) of all peaks at x for a field."""
+        """Return log likelihoods (peaks, points) of all peaks at x for a field.
+
+        >>> first = Onsets(np.zeros(1), np.array([[[1.0]], [[2.0]]]), (), 3.0)
+        >>> second, x = replace(first, area=4.0), np.array([0.5, 0.7])
+        >>> peaks = np.array([12.0]), np.array([30.0, 40.0])
+        >>> profiles = Profiles((None, None), 1.0, np.zeros(0), None)
+        >>> tables = Tables(profiles, None, (first, second), 0.6, peaks)
+        >>> table = tables.of_field(1, x)
+        >>> bool(np.allclose(table[:1], first.tabulated(1, peaks[0], 0.6, x)))
+        True
+        >>> bool(np.allclose(table[1:], second.tabulated(1, peaks[1], 0.6, x)))
+        True
+        >>> tables(x).shape, bool(np.allclose(tables(x)[1], table))
+        ((2, 3, 2), True)
+        """
         pairs = zip(self.onsets, self.peaks, strict=True)
         return np.concatenate([k.tabulated(field, peaks, self.error, x) for k, peaks in pairs])
 
@@ -426,7 +728,26 @@ class Tables:
         return np.stack([self.of_field(f, x) for f in range(len(self.profiles.fields))])
 
     def parts(self, u: Array) -> Array:
-        """Return log densities (draws, peaks) of all peaks at draws (draws, 4)."""
+        """Return log densities (draws, peaks) of all peaks at draws (draws, 4).
+
+        A peak at log x with the error e, if log b is normal with the deviation s:
+        the density is normal with the variance e² + s², and has the factor 1/peak:
+
+        >>> onsets = Onsets(np.zeros(1), np.array([[[1.0]], [[2.0]]]), (), 3.0)
+        >>> profiles = Profiles((None, None), 1.0, np.zeros(0), None, ("weibull", "lognormal"))
+        >>> tables = Tables(profiles, None, (onsets,), 0.6, (np.array([12.0, 11.0]),))
+        >>> found = tables.parts(np.array([[0.0, 1.0, 0.2, 1.3], [1.0, 1.0, 0.1, 0.6]]))
+        >>> for row, ratio, cv, mean in zip(found, (1.0, 2.0), (0.2, 0.1), (1.3, 0.6)):
+        ...     s = math.log(1.0 + cv**2)
+        ...     for value, peak in zip(row, (12.0, 11.0)):
+        ...         normal = scipy.stats.norm(mean - 0.5 * s, math.sqrt(s + (0.6 / peak) ** 2))
+        ...         expected = normal.logpdf(math.log(peak / 3.0 / ratio)) - math.log(peak)
+        ...         print(round(value - expected - 0.5 * math.log(2.0 * math.pi), 2) + 0.0)
+        0.0
+        0.0
+        0.0
+        0.0
+        """
         # The density of a peak at a draw is the integral over x, as in
         # step 3.
         x = points_between(self.ranges())
@@ -441,7 +762,26 @@ class Tables:
         return densities
 
     def predicted(self, kind: int, u: Array, seed: int) -> Array:
-        """Draw a peak of one specimen type for each draw (draws, 4)."""
+        """Draw a peak of one specimen type for each draw (draws, 4).
+
+        The ratio of field 1 is 2 or 4, and the area of kind 1 is 3. With little
+        scatter all peaks are 3 c times 2 or 4, at log c = 0.7:
+
+        >>> onsets = Onsets(np.zeros(1), np.array([[[1.0, 1.0]], [[2.0, 4.0]]]), (), 3.0)
+        >>> profiles = Profiles((None, None), 1.0, np.zeros(0), None, ("weibull", "lognormal"))
+        >>> tables = Tables(profiles, None, (None, onsets), 0.0, ())
+        >>> drawn = tables.predicted(1, np.tile([1.0, 1.0, 1e-6, 0.7], (50, 1)), 3)
+        >>> sorted({round(peak / 3.0 / math.exp(0.7), 4) for peak in drawn.tolist()})
+        [2.0, 4.0]
+        >>> drawn = tables.predicted(1, np.tile([0.0, 1.0, 0.2, 0.7], (9000, 1)), 3)
+        >>> drawn /= 3.0 * math.exp(0.7)
+        >>> round(float(drawn.mean()), 1), round(float(drawn.std()), 2)
+        (1.0, 0.2)
+        >>> noisy = replace(tables, error=0.5)
+        >>> drawn = noisy.predicted(1, np.tile([0.0, 1.0, 1e-6, 0.7], (9000, 1)), 3)
+        >>> round(float(drawn.std()), 1)
+        0.5
+        """
         rng = np.random.default_rng([seed, 1, kind])
         known, share = self.onsets[kind], rng.random(len(u))
         # A further specimen has its own factor and one of the simulated
@@ -473,6 +813,38 @@ class Prediction(NamedTuple):
         The predictive distribution is the mean over field, onset and
         grid, or over the part of the grid with this family. No draws
         are needed.
+
+        If the posterior has a single cell, T(c) = 2 c and c is lognormal with the
+        mean 1.5 e^0.5, the quantiles are known, to half a step of the grid:
+
+        >>> profiles = Profiles((None,), 1.5, np.zeros(0), None, ("weibull", "lognormal"),
+        ...                     FactorPrior(scipy.stats.uniform(0.2, 1e-9)))
+        >>> onsets = Onsets(np.zeros(1), np.array([[[2.0]]]), (), 3.0)
+        >>> mass = np.zeros((1, 2, 40, 2))
+        >>> mass[0, 0, 0, 0], mass[0, 1, 0, 0] = 0.4, 0.6
+        >>> grid = FactorGrid(profiles, np.array([0.5, 0.501]), mass)
+        >>> prediction = Prediction(Tables(profiles, None, (onsets,), 0.0, ()), grid)
+        >>> s = math.sqrt(math.log(1.04))
+        >>> expected = 2.0 * scipy.stats.lognorm(s, 0.0, math.exp(0.5 - 0.5 * s**2)).ppf(0.03)
+        >>> expected = float(expected)
+        >>> round(prediction.quantile(0.03, "lognormal") / expected, 2)
+        1.0
+        >>> expected = 2.0 * factor_of_family("weibull", 0.2).distribution.ppf(0.03) * math.exp(0.5)
+        >>> expected = float(expected)
+        >>> round(prediction.quantile(0.03, "weibull") / expected, 2)
+        1.0
+
+        The average over both families has probabilities that are averages:
+
+        >>> both = prediction.quantile(0.03)
+        >>> round(prediction.probability(both), 5)
+        0.03
+        >>> shares = [factor_of_family(name, 0.2).distribution.cdf(both / 2.0 / math.exp(0.5))
+        ...           for name in ("weibull", "lognormal")]
+        >>> round(float(np.dot([0.4, 0.6], shares)), 3)
+        0.03
+        >>> prediction.families
+        ['weibull', 'lognormal']
         """
         chance, (low, high) = self._distribution(family)
         if chance(low) < probability:  # or else a rarer peak than those of the table
@@ -523,6 +895,20 @@ class Prediction(NamedTuple):
         """Return the stress, Pa, whose quantile is higher in a fraction `confidence` of the draws.
 
         Fields are uniform, and `draws` are (draws, 4).
+
+        Three draws of log c, with hardly any scatter, and T(c) = 2 c:
+
+        >>> profiles = Profiles((None,), 1.0, np.zeros(0), None, ("weibull", "lognormal"))
+        >>> onsets = Onsets(np.zeros(1), np.array([[[2.0]]]), (), 3.0)
+        >>> tables = Tables(profiles, None, (onsets,), 0.0, ())
+        >>> draws = np.array([[0.0, 1.0, 1e-6, math.log(c)] for c in (4.0, 1.0, 3.0)])
+        >>> prediction = Prediction(tables, None)
+        >>> [round(prediction.characteristic(draws, 0.05, share), 3) for share in (1.0, 0.75, 0.0)]
+        [2.0, 4.0, 8.0]
+        >>> draws[:, 2] = 0.2
+        >>> factor = factor_of_family("lognormal", 0.2).distribution
+        >>> round(prediction.characteristic(draws, 0.05, 0.5) / float(factor.ppf(0.05)), 3)
+        6.0
         """
         x, known = draws[:, 3].copy(), self.tables.onsets[0]
         for family, cv, places in _factor_groups(self.tables.profiles, draws):
@@ -531,7 +917,24 @@ class Prediction(NamedTuple):
         return float(np.quantile(onsets, 1.0 - confidence))
 
     def divergence(self, first: str, second: str) -> float:
-        """Return the divergence, nats, of one family from another at the mean scatter."""
+        """Return the divergence, nats, of one family from another at the mean scatter.
+
+        The mean scatter is 0.2. The divergence of two distributions of log b:
+
+        >>> profiles = Profiles((None,), 1.0, np.zeros(0), None, ("weibull", "lognormal"),
+        ...                     FactorPrior(scipy.stats.uniform(0.2, 1e-9)))
+        >>> onsets = Onsets(np.zeros(1), np.array([[[2.0]]]), (), 3.0)
+        >>> tables = Tables(profiles, None, (onsets,), 0.0, ())
+        >>> grid = FactorGrid(profiles, None, np.full((1, 2, 40, 1), 1.0 / 80.0))
+        >>> prediction = Prediction(tables, grid)
+        >>> b = np.linspace(0.2, 2.5, 20001)
+        >>> p, q = (factor_of_family(name, 0.2).distribution for name in ("weibull", "lognormal"))
+        >>> expected = float(np.sum(p.pdf(b) * (p.logpdf(b) - q.logpdf(b))) * (b[1] - b[0]))
+        >>> round(prediction.divergence("weibull", "lognormal") / expected, 1)
+        1.0
+        >>> prediction.divergence("weibull", "weibull")
+        0.0
+        """
         scatters = self.tables.profiles.prior.cells()
         cv = float(self.grid.mass.sum(axis=(0, 1, 3)) @ scatters)
         x = np.linspace(-LOWEST, LOG_MEAN_MARGIN, PREDICTED)
@@ -548,6 +951,11 @@ def _factor_groups(profiles: Profiles, u: Array) -> list[tuple[str, float, Any]]
     """Group the draws by family and s.
 
     Return each family, its s, and the indices of its draws.
+
+    >>> profiles = Profiles((None,), 1.0, np.zeros(0), None, ("weibull", "lognormal"))
+    >>> u = np.array([[0, 1, 0.2, 5.0], [0, 0, 0.2, 6.0], [1, 1, 0.2, 7.0], [0, 1, 0.1, 8.0]])
+    >>> [(family, cv, places.tolist()) for family, cv, places in _factor_groups(profiles, u)]
+    [('weibull', 0.2, [1]), ('lognormal', 0.1, [3]), ('lognormal', 0.2, [0, 2])]
     """
     pairs, group = np.unique(u[:, 1:3], axis=0, return_inverse=True)
     return [
