@@ -109,7 +109,17 @@ def monte_carlo(
 
 
 def _peaks_of(measured: Any, quantity: str, variable: xr.DataArray) -> NDArray[np.float64]:
-    """Return measured peaks in SI, for the quantity that is drawn."""
+    """Return measured peaks in SI, for the quantity that is drawn.
+
+    >>> stress = xr.DataArray(1.0, attrs={"units": "Pa"})
+    >>> _peaks_of({0.1: [3.0, 4.0], 0.2: [5.0]}, "critical_stress", stress).tolist()
+    [3.0, 4.0, 5.0]
+    >>> _peaks_of(make_peaks([3.0, 4.0, 5.0], "kN"), "critical_stress", stress)
+    ... # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: measured: peaks are in N, but critical_stress in Pa. ...
+    """
     peaks = make_peaks(measured, str(variable.attrs.get("units", "1")))
     if peaks.unit != variable.attrs.get("units", "1"):
         raise InputError(
@@ -122,7 +132,35 @@ def _peaks_of(measured: Any, quantity: str, variable: xr.DataArray) -> NDArray[n
 def _draw_values(
     axes: Axes, variable: xr.DataArray, factor: float, label: str | None, number: int
 ) -> None:
-    """Draw the density of a variable, a histogram of positions, or marks of a few values."""
+    """Draw the density of a variable, a histogram of positions, or marks of a few values.
+
+    Twenty different values have a density, and fewer are marked. Positions are
+    counted in at least 5 cells, and values that are not finite are left out:
+
+    >>> from stiction.plot.axes import new_figure
+    >>> def drawn(values, units="Pa"):
+    ...     axes = new_figure(3.0, 2.0).subplots()
+    ...     variable = xr.DataArray(values, attrs={"units": units})
+    ...     _draw_values(axes, variable, 2.0, "name", 1)
+    ...     return axes
+    >>> (line,) = drawn(np.arange(20.0)).lines
+    >>> line.get_marker(), line.get_label(), line.get_color() == color(1)
+    ('None', 'name', True)
+    >>> peak = line.get_xdata()[line.get_ydata().argmax()]
+    >>> bool(15.0 < peak < 23.0)  # twice 9.5
+    True
+    >>> for values in (np.arange(19.0), np.full(20, 3.0)):
+    ...     (line,) = drawn([*values, np.nan]).lines
+    ...     print(line.get_marker(), line.get_xdata()[-1], line.get_ydata().max())
+    | 36.0 0.0
+    | 6.0 0.0
+    >>> (stairs,) = drawn(np.arange(500.0) / 499.0, "m").patches  # 10 cells up to 2
+    >>> values, edges, _ = stairs.get_data()
+    >>> values.size, edges[[0, -1]].tolist(), round(float(values @ np.diff(edges)), 9)
+    (10, [0.0, 2.0], 1.0)
+    >>> drawn(np.arange(60.0), "m").patches[0].get_data().values.size
+    5
+    """
     values, style = _finite(variable) * factor, {"label": label} | series(number)
     if variable.attrs.get("units") == "m" and values.size:
         cells = int(np.clip(values.size / 50, 5, 40))
@@ -202,11 +240,24 @@ def quantiles(
 
 
 def _swept(variable: xr.DataArray) -> list[str]:
+    """Return the dimensions of a sweep.
+
+    >>> _swept(xr.DataArray(np.zeros((2, 3, 4, 5)), dims=("seed", "sample", "mode", DIRECTION)))
+    ['seed', 'mode']
+    """
     return [str(dim) for dim in variable.dims if dim not in ("sample", DIRECTION)]
 
 
 def _steps(variable: xr.DataArray, along: str) -> list[tuple[str | None, xr.DataArray]]:
-    """Return at most `MAX_CURVES` evenly spread steps of a sweep, each with its name."""
+    """Return at most `MAX_CURVES` evenly spread steps of a sweep, each with its name.
+
+    >>> values = xr.DataArray(np.zeros((3, 20)), {"L": np.arange(20.0)}, ("sample", "L"))
+    >>> values["L"].attrs["units"] = "1"
+    >>> [name for name, _ in _steps(values, "L")]
+    ['0', '4', '8', '11', '15', '19']
+    >>> [(name, part.shape) for name, part in _steps(values[:, 5:7], "L")]
+    [('5', (3,)), ('6', (3,))]
+    """
     last, names = variable.sizes[along] - 1, _step_texts(variable[along])
     steps = np.unique(np.linspace(0, last, min(MAX_CURVES, last + 1)).round().astype(int))
     return [(names[step], variable.isel({along: step})) for step in steps]
@@ -215,7 +266,20 @@ def _steps(variable: xr.DataArray, along: str) -> list[tuple[str | None, xr.Data
 def _quantiles(
     part: xr.DataArray, factor: float, along: str
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return quantiles (levels, steps) and errors of the median (2, steps), as drawn."""
+    """Return quantiles (levels, steps) and errors of the median (2, steps), as drawn.
+
+    Seven values in thousands. The quartile has the rank 0.25 (7 + 1/3) + 1/3,
+    2.17. The interval of the median, 4, cannot leave the values 1 to 9. The
+    second step has no finite values:
+
+    >>> values = np.full((2, 7), np.nan)
+    >>> values[0] = [4e3, 1e3, 2e3, 9e3, 3e3, 5e3, 6e3]
+    >>> levels, errors = _quantiles(xr.DataArray(values, dims=("L", "sample")), 1e-3, "L")
+    >>> levels[1:4, 0].round(6).tolist(), bool(np.isnan(levels[:, 1]).all())
+    ([2.166667, 4.0, 5.833333], True)
+    >>> errors[:, 0].round(6).tolist()
+    [3.0, 5.0]
+    """
     values_at = np.full((len(DRAWN_QUANTILES), part.sizes[along]), np.nan)
     errors = values_at[:2].copy()
     for step in range(part.sizes[along]):
@@ -229,12 +293,25 @@ def _quantiles(
 
 
 def _finite(values: Any) -> NDArray[np.float64]:
+    """Return the finite values as a flat array.
+
+    >>> _finite(xr.DataArray([[1.0, np.nan], [np.inf, 2.0]])).tolist()
+    [1.0, 2.0]
+    """
     array = np.asarray(values, dtype=np.float64).ravel()
     return array[np.isfinite(array)]
 
 
 def _step_texts(coordinate: xr.DataArray) -> list[str]:
-    """Return the values at the steps of a sweep, in the unit of its name."""
+    """Return the values at the steps of a sweep, in the unit of its name.
+
+    >>> lengths = xr.DataArray([0.00123456, 0.05], name="length", attrs={"units": "m"})
+    >>> _step_texts(lengths), _step_texts(xr.DataArray([3, 40]))
+    (['1.235', '50'], ['3', '40'])
+    >>> texts = _step_texts(xr.DataArray(["a" * 40, "b" * 41]))
+    >>> texts[0] == "a" * 40, texts[1] == "b" * 37 + "..."
+    (True, True)
+    """
     if coordinate.dtype.kind == "f":
         return [f"{value:.4g}" for value in coordinate.values * scaled(coordinate)[0]]
     texts = map(str, coordinate.values)

@@ -100,6 +100,11 @@ def _quantiles(axes: Axes, field_fit: FieldFit) -> None:
 
 
 def _powers(observed: list[Observed]) -> list[Array]:
+    """Return the average periodogram of each window.
+
+    >>> _powers([Observed(None, 1, "first", 0.0), Observed(None, 1, "second", 0.0)])
+    ['first', 'second']
+    """
     return [of_window.average for of_window in observed]
 
 
@@ -110,6 +115,29 @@ def _pooled_correlation(lag: Array, observed: list[Observed], powers: list[Array
 
     A record counts at lags up to half its length, because a periodic
     record repeats longer lags.
+
+    Without a taper, the power of a wave cos(2 pi 2 m/8) is 16 at both of its
+    wavenumbers, and its correlation is the same wave:
+
+    >>> from types import SimpleNamespace
+    >>> window = SimpleNamespace(shape=(8,), spacings=(0.5,), measured=np.ones(8, dtype=bool))
+    >>> lag, power = np.array([0.0, 0.5, 1.0, 1.25, 2.0, 2.5]), np.array([0.0, 0.0, 16.0, 0.0, 0.0])
+    >>> observed = [Observed(window, 3, None, 0.0)]
+    >>> with np.errstate(invalid="ignore"):
+    ...     _pooled_correlation(lag, observed, [power]).round(9).tolist()  # up to half of 8 points
+    [1.0, 0.0, -1.0, -0.5, 1.0, nan]
+
+    A second window of 16 points, each 0.5 m, with white noise, counts by its
+    numbers of records and points, and by its variance:
+
+    >>> white = SimpleNamespace(shape=(16,), spacings=(0.5,), measured=np.arange(16) < 12)
+    >>> observed.append(Observed(white, 2, None, 0.0))
+    >>> found = _pooled_correlation(lag, observed, [power, np.full(9, 8.0)])
+    >>> wave = np.array([1.0, 0.0, -1.0, -0.5, 1.0, 0.0])  # variances 4 and 8
+    >>> first, second = 3 * 8 * 4.0, 2 * 12 * 8.0
+    >>> expected = (first * wave + second * (lag == 0)) / (first * (lag <= 2.0) + second)
+    >>> bool(np.allclose(found, expected))
+    True
     """
     total, variance = np.zeros(lag.size), np.zeros(lag.size)
     for (window, records, *_), power in zip(observed, powers, strict=True):
@@ -142,7 +170,30 @@ def _correlation(
 
 
 def _pooled_spectrum(observed: list[Observed], powers: list[Array]) -> Array:
-    """Return band averages (2, bands) of wavenumber (rad/m) and spectral density."""
+    """Return band averages (2, bands) of wavenumber (rad/m) and spectral density.
+
+    Wavenumbers 1, 2 and 4 (rad/m) are two octaves, and 2.1 falls to 2. Records
+    weight a band. The density is the power times the spacing:
+
+    >>> from types import SimpleNamespace
+    >>> def window(k, spacing):
+    ...     k = np.array(k)
+    ...     return SimpleNamespace(weights=1.0 * (k > 0.0), wave_vectors=(k,), spacings=(spacing,))
+    >>> first, second = window([0.0, 1.0, 2.0], 0.5), window([0.0, 2.1, 4.0], 0.25)
+    >>> observed = [Observed(first, 3, None, 0.0), Observed(second, 1, None, 0.0)]
+    >>> powers = [np.array([99.0, 8.0, 4.0]), np.array([99.0, 4.0, 2.0])]
+    >>> k, density = _pooled_spectrum(observed, powers)
+    >>> k.round(9).tolist(), density.round(9).tolist()  # (3 x 2 + 2.1)/4, (3 x 2 + 1)/4
+    ([1.0, 2.025, 4.0], [4.0, 1.75, 0.5])
+
+    On a plane the length of the wave vector counts:
+
+    >>> plane = SimpleNamespace(weights=np.ones((2, 1)), spacings=(0.5, 2.0),
+    ...                         wave_vectors=(np.array([[3.0], [6.0]]), np.array([[4.0]])))
+    >>> k, density = _pooled_spectrum([Observed(plane, 1, None, 0.0)], [np.array([[3.0], [7.0]])])
+    >>> k.round(4).tolist(), density.tolist()
+    ([5.0, 7.2111], [3.0, 7.0])
+    """
     rows: list[tuple[Array, Array, Array]] = []
     for (window, records, *_), power in zip(observed, powers, strict=True):
         kept = window.weights > 0.0
@@ -183,7 +234,16 @@ def _spectrum(
 def _compare(
     axes: Axes, at: Any, measured: Any, fitted: Any, spread: Any, *labels: str
 ) -> None:
-    """Draw data as points, the fit as a line, and a band with 90 % of the repetitions."""
+    """Draw data as points, the fit as a line, and a band with 90 % of the repetitions.
+
+    >>> axes = new_figure(3.0, 2.0).subplots()
+    >>> rows = np.outer(np.arange(101.0), [1.0, 2.0])
+    >>> _compare(axes, [5.0, 6.0], [1.0, 2.0], [3.0, 4.0], rows, "measured", "fitted")
+    >>> for line in axes.lines:
+    ...     print(line.get_label(), line.get_ydata().tolist(), line.get_linestyle())
+    fitted [3.0, 4.0] -
+    measured [1.0, 2.0] None
+    """
     of_data, of_fit = labels or (None, None)
     _band(axes, at, spread)
     axes.plot(at, fitted, color=color(1), label=of_fit)
@@ -191,6 +251,15 @@ def _compare(
 
 
 def _band(axes: Axes, at: Any, rows: Any) -> None:
+    """Fill between the 5 % and 95 % quantiles of rows. A row of NaN does not count.
+
+    >>> axes = new_figure(3.0, 2.0).subplots()
+    >>> rows = np.append(np.outer(np.arange(101.0), [1.0, 2.0]), [[np.nan, np.nan]], axis=0)
+    >>> _band(axes, [5.0, 6.0], rows)
+    >>> (path,) = axes.collections[0].get_paths()
+    >>> sorted({(float(x), round(float(y), 6)) for x, y in path.vertices})
+    [(5.0, 5.0), (5.0, 95.0), (6.0, 10.0), (6.0, 190.0)]
+    """
     low, high = np.nanquantile(rows, [0.05, 0.95], axis=0)
     axes.fill_between(at, low, high, color=color(1), alpha=0.25, linewidth=0.0)
 

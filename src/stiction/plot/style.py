@@ -65,17 +65,36 @@ def paper_style() -> Iterator[None]:
     """Set the fonts, widths, colours and ticks of a printed page for figures drawn inside.
 
     Inside, a user's style, such as a dark style, has no effect.
+
+    >>> with matplotlib.style.context({"font.size": 30.0, "lines.marker": "x"}):
+    ...     with paper_style():
+    ...         matplotlib.rcParams["font.size"], matplotlib.rcParams["lines.marker"]
+    ...     matplotlib.rcParams["font.size"]
+    (8.5, 'None')
+    30.0
     """
     with matplotlib.style.context(["default", _RC]):
         yield
 
 
 def series(index: int) -> dict[str, Any]:
-    """Return plot keywords for series number `index`: colour and dashes."""
+    """Return plot keywords for series number `index`: colour and dashes.
+
+    Six series differ, and the seventh is as the first:
+
+    >>> series(6) == series(0), len({str(series(index)) for index in range(6)})
+    (True, 6)
+    >>> series(0)
+    {'color': '#14213d', 'linestyle': '-'}
+    """
     color, dashes = _SERIES[index % len(_SERIES)]
     return {"color": color, "linestyle": dashes}
 
 
 def color(index: int) -> str:
-    """Return the colour of series number `index`."""
+    """Return the colour of series number `index`.
+
+    >>> color(1), color(8)
+    ('#2a6f97', '#c8553d')
+    """
     return str(series(index)["color"])
