@@ -120,7 +120,22 @@ def field(
 
 
 def rows_of(interface: Interface, profile: Any, quantity: str = "strength") -> Array:
-    """Return a profile as (samples, *shape) in SI, with NaN in gaps, or raise an `InputError`."""
+    """Return a profile as (samples, *shape) in SI, with NaN in gaps, or raise an `InputError`.
+
+    >>> interface = Interface(0.1, 8)
+    >>> rows_of(interface, np.arange(8.0)).shape, rows_of(interface, np.ones((3, 8)), "slip").shape
+    ((1, 8), (3, 8))
+    >>> plane = Interface((0.1, 0.2), (8, 10))
+    >>> rows_of(plane, np.ones((8, 10))).shape, rows_of(plane, np.ones((2, 8, 10))).shape
+    ((1, 8, 10), (2, 8, 10))
+    >>> for values in (np.ones((1, 2, 8)), np.ones((0, 8))):
+    ...     try:
+    ...         rows_of(interface, values)
+    ...     except InputError as error:
+    ...         print(str(error)[:31])
+    profile: must have shape (8) or
+    profile: must have shape (8) or
+    """
     shape = interface.shape
     with prefixed("profile"):
         values = at_nodes(quantity, profile, interface, missing=True)
@@ -133,7 +148,14 @@ def rows_of(interface: Interface, profile: Any, quantity: str = "strength") -> A
 
 
 def name_line(axes: Axes, interface: Interface, text: str) -> None:
-    """Label the scales of profiles along a line."""
+    """Label the scales of profiles along a line.
+
+    >>> from stiction.plot.axes import new_figure
+    >>> axes = new_figure(3.0, 2.0).subplots()
+    >>> name_line(axes, Interface(0.25, 8), "strength (MPa)")
+    >>> axes.get_xlabel(), axes.get_ylabel(), tuple(map(float, axes.get_xlim()))
+    ('position $x$ (mm)', 'strength (MPa)', (0.0, 250.0))
+    """
     factor, unit = unit_for("m", interface.lengths)
     axes.set_xlim(0.0, interface.measure * factor)
     axes.set(xlabel=f"position $x$ ({unit})", ylabel=text)
@@ -142,7 +164,23 @@ def name_line(axes: Axes, interface: Interface, text: str) -> None:
 def draw_map(
     axes: Axes, interface: Interface, values: NDArray[Any], text: str, **options: Any
 ) -> Any:
-    """Draw values (nx, ny) on a plane, with their scale and the names of the directions."""
+    """Draw values (nx, ny) on a plane, with their scale and the names of the directions.
+
+    Cells of 25 mm along x and of 20 mm along y are centred at the nodes:
+
+    >>> from stiction.plot.axes import new_figure
+    >>> axes = new_figure(3.0, 2.0).subplots()
+    >>> values = np.arange(80.0).reshape(8, 10)
+    >>> drawn = draw_map(axes, Interface((0.2, 0.2), (8, 10)), values, "slip", cmap="cividis")
+    >>> [round(float(end), 9) for end in drawn.get_extent()], drawn.origin
+    ([-12.5, 187.5, -10.0, 190.0], 'lower')
+    >>> float(drawn.get_array()[3, 2]), drawn.get_cmap().name  # row 3 along y
+    (23.0, 'cividis')
+    >>> axes.get_xlabel(), axes.get_ylabel()
+    ('$x$ (mm), direction of slip', '$y$ (mm)')
+    >>> axes.figure.axes[1].get_xlabel()
+    'slip'
+    """
     factor, unit = unit_for("m", interface.lengths)
     (x, y), (dx, dy) = interface.lengths, interface.spacings
     ends: Any = factor * np.array([-0.5 * dx, x - 0.5 * dx, -0.5 * dy, y - 0.5 * dy])
@@ -157,7 +195,13 @@ def draw_map(
 
 
 def map_height(interface: Interface, more: float = 1.0) -> float:
-    """Return the height, inches, of a figure with a map and `more` for other parts."""
+    """Return the height, inches, of a figure with a map and `more` for other parts.
+
+    >>> [round(map_height(Interface((0.1, y), (8, 8))), 9) for y in (0.05, 0.001, 0.5)]
+    [3.0, 1.8, 9.0]
+    >>> map_height(Interface((0.1, 0.05), (8, 8)), 2.5)
+    4.5
+    """
     x, y = interface.lengths
     return more + 4.0 * float(np.clip(y / x, 0.2, 2.0))
 
@@ -241,7 +285,19 @@ def onset(
 
 
 def strength_of(problem: Problem, strength: Any) -> Array:
-    """Return profiles (samples, *shape) in Pa, with coefficients multiplied by the pressure."""
+    """Return profiles (samples, *shape) in Pa, with coefficients multiplied by the pressure.
+
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> from dataclasses import replace
+    >>> pressed = replace(problem, load=st.Load(normal_pressure=2e6))
+    >>> coefficients = xr.DataArray(np.full(256, 0.4), {"x": problem.interface.x})
+    >>> coefficients.attrs["units"] = "1"
+    >>> strength_of(pressed, coefficients)[0, 0].round(6).tolist()
+    800000.0
+    >>> strength_of(pressed, np.full(256, 0.4))[0, 0].tolist()  # numbers alone are in Pa
+    0.4
+    """
     if is_coefficient(strength) and problem.given_pressure is not None:
         coefficient = rows_of(problem.interface, strength, "friction_coefficient")
         return np.asarray(coefficient * problem.normal_pressure)
@@ -254,6 +310,24 @@ def chosen_row(
     """Return a sample of each result.
 
     Results must have as many samples as the profile has rows.
+
+    >>> several = xr.Dataset({"load": ("sample", [3.0, 5.0, 7.0])})
+    >>> both = {"a": several, "b": 2.0 * several}
+    >>> chosen_row(np.zeros((3, 8)), both, 1)["b"]["load"].values.tolist()
+    [10.0]
+    >>> chosen_row(None, {"a": xr.Dataset({"load": 3.0})}, 0)["a"]["load"].values.tolist()
+    [3.0]
+    >>> chosen_row(np.zeros((9, 8)), {}, 8), chosen_row(None, {}, 99)
+    ({}, {})
+    >>> for rows, sample in ((np.zeros((2, 8)), 0), (None, 3), (None, -1), (None, 0.5)):
+    ...     try:
+    ...         chosen_row(rows, {"a": several}, sample)
+    ...     except InputError as error:
+    ...         print(error)
+    results: need as many samples as strength, got [2, 3]
+    sample: must be 0 to 2, got 3
+    sample: must be 0 to 2, got -1
+    sample: must be 0 to 2, got 0.5
     """
     by_sample = {
         name: result if "sample" in result.dims else result.expand_dims("sample")
@@ -273,7 +347,32 @@ def chosen_row(
 def _mark(
     axes: Axes, interface: Interface, results: Mapping[str, xr.Dataset], factor: float
 ) -> None:
-    """Mark the positions of onsets. On a line, their heights are the loads times `factor`."""
+    """Mark the positions of onsets. On a line, their heights are the loads times `factor`.
+
+    Loads in Pa are drawn in MPa, and lengths in mm:
+
+    >>> from stiction.plot.axes import new_figure
+    >>> axes = new_figure(3.0, 2.0).subplots()
+    >>> result = xr.Dataset(
+    ...     {"critical_position": ("sample", [0.03]), "critical_load": ("sample", [7e5])})
+    >>> pressed = result.assign(friction_coefficient=("sample", [0.35]))
+    >>> _mark(axes, Interface(0.1, 8), {"one": result, "two": pressed}, 1e-6)
+    >>> for line in axes.lines:
+    ...     print(line.get_label(), line.get_xydata().round(6).tolist(), line.get_markersize())
+    one: 0.7000 MPa at 30.00 mm [[30.0, 0.7]] 9.0
+    two: 0.7000 MPa (coefficient 0.3500) at 30.00 mm [[30.0, 0.7]] 5.5
+    >>> [line.get_marker() for line in axes.lines], axes.lines[1].get_color() == color(2)
+    (['o', 's'], True)
+
+    On a plane the place is marked:
+
+    >>> plane = Interface((0.1, 0.2), (8, 10))
+    >>> place = xr.Dataset({"critical_position": (("sample", "direction"), [[0.03, 0.05]]),
+    ...                     "critical_load": ("sample", [7e5])})
+    >>> _mark(axes, plane, {"three": place}, 1e-6)
+    >>> axes.lines[2].get_label(), axes.lines[2].get_xydata().tolist()
+    ('three: 0.7000 MPa at 30.00, 50.00 mm', [[30.0, 50.0]])
+    """
     length, length_unit = unit_for("m", interface.lengths)
     for number, (name, result) in enumerate(results.items()):
         place = np.atleast_1d(result["critical_position"].values[0]) * length

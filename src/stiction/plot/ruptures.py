@@ -151,7 +151,17 @@ def film(
 
 
 def _since_onset(run: xr.Dataset, times: str = "time") -> tuple[Array, str]:
-    """Return the times of a run, s, and the name of the event at time zero, such as the onset."""
+    """Return the times of a run, s, and the name of the event at time zero, such as the onset.
+
+    >>> run = xr.Dataset(
+    ...     {"onset_time": 2.0, "time": ("time", [1.0, 5.0]), "arrival_time": ("x", [3.0])})
+    >>> since, name = _since_onset(run)
+    >>> since.tolist(), name, _since_onset(run, "arrival_time")[0].tolist()
+    ([-1.0, 3.0], ' since the onset', [1.0])
+    >>> since, name = _since_onset(run.assign(onset_time=np.inf))
+    >>> since.tolist(), name
+    ([1.0, 5.0], '')
+    """
     onset = float(run["onset_time"])
     if np.isfinite(onset):
         return run[times].values - onset, " since the onset"
@@ -162,6 +172,12 @@ def _masked_by_decade(slip_rate: Array, decades: float) -> tuple[Any, LogNorm]:
     """Return slip rates and their colours.
 
     Rates many decades below the largest are masked.
+
+    >>> rates, norm = _masked_by_decade(np.array([0.0, 0.019, 0.021, 2.0]), 2.0)
+    >>> rates.mask.tolist(), round(norm.vmin, 9), norm.vmax
+    ([True, True, False, False], 0.02, 2.0)
+    >>> _masked_by_decade(np.zeros(3), 2.0)[1].vmax
+    1e-12
     """
     top = max(float(slip_rate.max()), 1e-12)
     low = top * 10.0**-decades
@@ -169,12 +185,41 @@ def _masked_by_decade(slip_rate: Array, decades: float) -> tuple[Any, LogNorm]:
 
 
 def _strength(run: xr.Dataset) -> tuple[Array, float, str]:
-    """Return the peak strength, Pa (NaN if infinite), and the factor and unit of a scale."""
+    """Return the peak strength, Pa (NaN if infinite), and the factor and unit of a scale.
+
+    >>> strength, factor, unit = _strength(xr.Dataset({"peak_strength": ("x", [2e6, np.inf, 4e6])}))
+    >>> strength.tolist(), round(factor * 1e6, 9), unit
+    ([2000000.0, nan, 4000000.0], 1.0, 'MPa')
+    """
     strength = run["peak_strength"].where(np.isfinite(run["peak_strength"])).values
     return strength, *unit_for("Pa", strength)
 
 
 def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
+    """Draw the slip rate of a line over x and time.
+
+    >>> import stiction as st
+    >>> from stiction.plot.axes import new_figure
+    >>> problem = st.paper.problem(nodes=256)
+    >>> times, rates = np.arange(9.0) * 1e-5 + 1e-3, np.zeros((9, 256))
+    >>> rates[3:6, 10:20] = 2.0
+    >>> run = xr.Dataset({"onset_time": 1.02e-3, "critical_position": 0.03, "time": ("time", times),
+    ...                   "slip_rate": (("time", "x"), rates)})
+    >>> axes = new_figure(3.0, 2.0).subplots()
+    >>> _draw_space_time(axes, run, problem)
+
+    The time begins 0.11 x 0.1 m / 924 m/s = 11.9 µs before the onset, and ends as
+    long after the last slip, at 30 µs:
+
+    >>> (mesh,) = axes.collections
+    >>> edges = mesh.get_coordinates()
+    >>> edges[[0, 1, -1], 0, 1].round(6).tolist(), axes.get_ylabel()
+    ([-10.0, -5.0, 40.0], 'time since the onset (µs)')
+    >>> edges[0, [0, 1, -1], 0].round(6).tolist()  # cells of 0.390625 mm around nodes
+    [-0.195312, 0.195312, 99.804688]
+    >>> axes.lines[0].get_xydata().tolist()
+    [[30.0, 0.0]]
+    """
     interface = problem.interface
     since, begin = _since_onset(run)
     slip_rate, norm = _masked_by_decade(run["slip_rate"].values, DECADES)
@@ -201,6 +246,28 @@ def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
 
 
 def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
+    """Draw the strength of a plane, and the front at equal intervals of time.
+
+    >>> import stiction as st
+    >>> from stiction.plot.axes import new_figure
+    >>> from types import SimpleNamespace
+    >>> interface = st.Interface((0.2, 0.1), (8, 10))
+    >>> x, y = np.meshgrid(*interface.coordinates.values(), indexing="ij")
+    >>> run = xr.Dataset({"onset_time": 0.0, "critical_position": ("direction", [0.05, 0.02]),
+    ...                   "peak_strength": (("x", "y"), 2e6 + 1e6 * x),
+    ...                   "arrival_time": (("x", "y"), 1e-3 * (x + 2 * y))})
+    >>> axes = new_figure(3.0, 2.0).subplots()
+    >>> _draw_front(axes, run, SimpleNamespace(interface=interface))
+    >>> axes.lines[0].get_xydata().round(9).tolist()
+    [[50.0, 20.0]]
+    >>> contours = axes.collections[-1]
+    >>> latest = 1e6 * np.quantile((1e-3 * (x + 2 * y))[x + y > 0.0], FRONT_SHARE)
+    >>> (contours.levels / latest * 9.0).round(6).tolist()
+    [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
+    >>> at = contours.get_paths()[3].vertices
+    >>> bool(np.allclose(at[:, 0] + 2.0 * at[:, 1], contours.levels[3], rtol=1e-6))
+    True
+    """
     interface, (strength, factor, unit) = problem.interface, _strength(run)
     text = rf"strength $\tau_p$ ({unit})"
     draw_map(axes, interface, strength * factor, text, cmap=STRENGTH)
@@ -224,7 +291,20 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
 
 
 def _clock(figure: Figure, run: xr.Dataset) -> tuple[Any, str, list[str]]:
-    """Return the text at the top of a figure, and its content by frame: time and mean stress."""
+    """Return the text at the top of a figure, and its content by frame: time and mean stress.
+
+    >>> figure = Figure()
+    >>> run = xr.Dataset({"onset_time": 1e-4, "time": ("time", [0.99e-4, 1e-4, 1.25e-4]),
+    ...                   "mean_stress": ("time", [2e6, 1.5e6, -0.1])})
+    >>> title, name, texts = _clock(figure, run)
+    >>> for text in texts:
+    ...     print(text)
+    -1.0 µs since the onset,  mean stress 2.000 MPa
+    0.0 µs since the onset,  mean stress 1.500 MPa
+    25.0 µs since the onset,  mean stress 0.000 MPa
+    >>> name, title.get_text() == texts[0]
+    ('text', True)
+    """
     since, begin = _since_onset(run)
     late = since[since > 0.0]
     factor, unit = unit_for("s", late if late.size else since)
@@ -240,6 +320,28 @@ def _clock(figure: Figure, run: xr.Dataset) -> tuple[Any, str, list[str]]:
 
 
 def _line_film(run: xr.Dataset) -> tuple[Figure, Moving]:
+    """Return the figure of a line, and what moves.
+
+    >>> run = xr.Dataset(
+    ...     {"slip_rate": (("time", "x"), [[0.0, 1.0, 2.0], [0.0, 3.0, 0.5]]), "onset_time": 0.0,
+    ...      "shear_stress": (("time", "x"), [[1e6, 2e6, 3e6], [2e6, 1e6, 4e6]]),
+    ...      "peak_strength": ("x", [np.inf, 3e6, 5e6]), "mean_stress": ("time", [2e6, 2.1e6])},
+    ...     {"time": [0.0, 1e-3], "x": [0.0, 0.1, 0.2]})
+    >>> figure, moving = _line_film(run)
+    >>> [name for _, name, _ in moving], moving[0][2].tolist()
+    (['ydata', 'ydata', 'text'], [[1.0, 2.0, 3.0], [2.0, 1.0, 4.0]])
+    >>> moving[1][2].tolist()  # zero on a logarithmic scale
+    [[3e-10, 1.0, 2.0], [3e-10, 3.0, 0.5]]
+    >>> above, below = figure.axes
+
+    The first node cannot break. Stresses range from 1 to 5 MPa, with a margin of
+    6 %, and the nodes that break from 100 to 300 mm, with a margin of 5 %:
+
+    >>> np.round(above.get_ylim(), 6).tolist(), np.round(below.get_xlim(), 6).tolist()
+    ([-0.24, 5.24], [90.0, 310.0])
+    >>> np.log10(below.get_ylim()).round(6).tolist() == np.log10([3e-7, 9.0]).round(6).tolist()
+    True
+    """
     length, length_unit = unit_for("m", run["x"].values)
     x, (strength, factor, unit) = run["x"].values * length, _strength(run)
     strength, stress = strength * factor, run["shear_stress"].values * factor
