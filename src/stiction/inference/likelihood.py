@@ -298,6 +298,9 @@ def simulate(
     >>> later = simulate(experiments, Simulation(method, 3, 3), 2, "critical_stress")
     >>> bool(np.allclose(later[1], high[2:]))
     True
+    >>> other = simulate(experiments, Simulation(method, 3, 4), 0, "critical_stress")  # seed 4
+    >>> bool(np.allclose(other[1], high[:3]))
+    False
     """
     samples: Any = simulation.samples
     peaks = np.empty((len(experiments), samples))
@@ -451,9 +454,11 @@ class Likelihood:
 
         The likelihood is the product of all parts, and 0 outside the box:
 
-        >>> values = likelihood(np.array([[0.1], [0.5], [0.51]]))
+        >>> values = likelihood(np.array([[0.1], [0.5], [0.51], [0.2]]))
         >>> values[[0, 2]].tolist(), round(float(values[1] - parts[1].sum()), 9)
         ([-inf, -inf], 0.0)
+        >>> bool(np.isfinite(values[3]))  # at the lower end of the box
+        True
         """
         theta, parts = self.prior.theta(u), []
         near = corners(self.axes, theta)
@@ -503,6 +508,15 @@ class Likelihood:
         >>> drawn = likelihood.predicted(0, np.full((90, 1), 0.25), 0)
         >>> sorted({round(peak, 6) for peak in drawn.tolist()})
         [2.0, 4.0, 8.0]
+
+        The sample belongs to the first node with the probability 3/4. If all
+        onsets at the second node are the least, the least has 3/4 x 1/3 + 1/4:
+
+        >>> known = known._replace(onsets=np.array([[1.0, 2.0, 4.0], [16.0, 16.0, 16.0]]))
+        >>> likelihood = replace(likelihood, densities=[known])
+        >>> drawn = likelihood.predicted(0, np.full((4000, 1), 0.25), 0)
+        >>> bool(0.45 < np.mean(drawn < 2.1) < 0.55)
+        True
         """
         rng = np.random.default_rng([seed, 1, kind])
         theta = self.prior.theta(u)

@@ -507,6 +507,10 @@ class FactorGrid:
         >>> found = FactorGrid(profiles, None, None).interface(drawn)
         >>> found.strength.marginal.cv, round(found.strength.mean, 3)
         (0.3, 3000000.0)
+        >>> drawn[1] = 1.0
+        >>> other = FactorGrid(profiles, None, None).interface(drawn).between["strength"]
+        >>> type(other) is FACTOR_FAMILIES["normal"]
+        True
         >>> factor = found.between["strength"]
         >>> type(factor).__name__, round(factor.cv, 9), round(factor.mean, 9)
         ('Weibull', 0.2, 1.0)

@@ -101,7 +101,50 @@ def specimen(
 
 
 def _draw_blocks(axes: Axes, problem: Problem, scale: float) -> None:
-    """Draw two blocks, and arrows for the drive. The heights have a separate scale."""
+    """Draw two blocks, and arrows for the drive. The heights have a separate scale.
+
+    Blocks 40 mm high and 100 mm long. The upper block is pushed to the right at
+    its left end, at a height of 10 mm, and the lower block to the left:
+
+    >>> import stiction as st
+    >>> from types import SimpleNamespace
+    >>> def drawn(drive):
+    ...     specimen = SimpleNamespace(height=0.04, drive=drive)
+    ...     problem = SimpleNamespace(specimen=specimen, interface=st.Interface(0.1, 8))
+    ...     axes = new_figure(3.0, 2.0).subplots()
+    ...     _draw_blocks(axes, problem, 1e3)
+    ...     return axes
+    >>> def arrows(patches):
+    ...     rows = []
+    ...     for xy in [patch.get_xy() for patch in patches]:
+    ...         low, high, head = xy[:, 0].min(), xy[:, 0].max(), xy[xy[:, 1].argmax(), 0]
+    ...         height = f"{xy[:, 1].mean():.0f}"
+    ...         ends = f"{low:.0f}", f"{high:.0f}"
+    ...         rows.append(("-->" if 2.0 * head > low + high else "<--", *ends, height))
+    ...     return rows
+    >>> axes = drawn(st.Pusher(height=0.01, width=0.005))
+    >>> [(part.get_xy(), part.get_width(), part.get_height()) for part in axes.patches[:2]]
+    [((0.0, -40.0), 100.0, 40.0), ((0.0, 0.0), 100.0, 40.0)]
+    >>> arrows(axes.patches[2:])
+    [('-->', '-14', '0', '10'), ('<--', '-14', '0', '-10')]
+    >>> [line.get_xydata().round(6).tolist() for line in axes.lines[1:]]
+    [[[0.0, 7.5], [0.0, 12.5]], [[0.0, -12.5], [0.0, -7.5]]]
+
+    A pusher at the right pushes the upper block to the left, and pushers on both
+    sides drive it to the right. The last drive is shear at both faces:
+
+    >>> arrows(drawn(st.Pusher(height=0.01, width=0.005, side="right")).patches[2:])
+    [('<--', '100', '114', '10'), ('-->', '100', '114', '-10')]
+    >>> arrows(drawn(st.Pusher(height=0.01, width=0.005, side="both")).patches[2:4])
+    [('-->', '-14', '0', '10'), ('-->', '100', '114', '10')]
+    >>> axes = drawn(st.TopShear())
+    >>> arrows(axes.patches[2:])
+    [('-->', '36', '64', '46'), ('<--', '36', '64', '-46')]
+    >>> [line.get_ydata().round(6).tolist() for line in axes.lines[1:]]
+    [[40.0, 40.0], [-40.0, -40.0]]
+    >>> [round(float(end), 6) for end in (*axes.get_xlim(), *axes.get_ylim())]
+    [-20.0, 120.0, -52.0, 52.0]
+    """
     blocks, length = problem.specimen, problem.interface.measure * scale
     assert blocks is not None  # `problem.blocks` has refused it
     height, drive = blocks.height * scale, blocks.drive
@@ -159,7 +202,55 @@ def _draw_slider(problem: Problem, sample: Sample) -> NDArray[Any]:
 
 
 def _draw_slider_and_base(axes: Axes, problem: Problem, scale: float) -> None:
-    """Draw a slider, its base and arrows for the drive and the pressing, to scale."""
+    """Draw a slider, its base and arrows for the drive and the pressing, to scale.
+
+    A slider 100 mm long on a base with 60 mm behind it and 90 mm ahead, which
+    is glued at its bottom:
+
+    >>> import stiction as st
+    >>> from types import SimpleNamespace
+    >>> def drawn(bottom="fixed", **slider):
+    ...     base = st.Base(height=0.03, behind=0.06, ahead=0.09, bottom=bottom)
+    ...     slider = {"height": 0.05, "drive": st.Pusher(height=0.02, width=0.01)} | slider
+    ...     problem = SimpleNamespace(interface=st.Interface(0.1, 8, ends="free"),
+    ...                               specimen=st.Slider(base=base, **slider))
+    ...     axes = new_figure(3.0, 2.0).subplots()
+    ...     _draw_slider_and_base(axes, problem, 1e3)
+    ...     return axes
+    >>> def rounded(*values):
+    ...     return [round(float(value), 6) for value in values]
+    >>> axes = drawn()
+    >>> [rounded(*part.get_xy(), part.get_width(), part.get_height()) for part in axes.patches[:2]]
+    [[0.0, 0.0, 100.0, 50.0], [-60.0, 0.0, 250.0, -30.0]]
+    >>> [line.get_xydata().round(6).tolist() for line in axes.lines]
+    [[[0.0, 0.0], [100.0, 0.0]], [[-60.0, -30.0], [190.0, -30.0]], [[0.0, 15.0], [0.0, 25.0]]]
+    >>> def arrow(patch):  # from, to, height
+    ...     x, y = patch.get_xy().T
+    ...     ends = sorted([x.min(), x.max()], key=lambda end: -abs(end - x[y.argmax()]))
+    ...     return rounded(*ends, 0.5 * (y.min() + y.max()))
+    >>> arrow(axes.patches[2])
+    [-20.0, 0.0, 20.0]
+    >>> rounded(*axes.get_xlim(), *axes.get_ylim())
+    [-60.0, 190.0, -33.0, 80.0]
+
+    Pushed at the right, the base ahead of the slider lies to its left. Arrows of
+    a tilted pressure are long at the leading end:
+
+    >>> axes = drawn("rollers", drive=st.Pusher(height=0.02, width=0.01, side="right"), tilt=0.5)
+    >>> rounded(*axes.patches[1].get_xy()), [rounded(*line.get_ydata()) for line in axes.lines]
+    ([-90.0, 0.0], [[0.0, 0.0], [15.0, 25.0]])
+    >>> arrow(axes.patches[2])
+    [120.0, 100.0, 20.0]
+    >>> [rounded(xy[:, 0].mean(), np.ptp(xy[:, 1]), xy[:, 1].min())
+    ...  for xy in (axes.patches[3].get_xy(), axes.patches[-1].get_xy())]
+    [[100.0, 5.0, 55.0], [0.0, 10.0, 55.0]]
+
+    Shear at the top, and a plate:
+
+    >>> axes = drawn(drive=st.TopShear(), pressing="plate")
+    >>> arrow(axes.patches[2]), [rounded(*line.get_ydata()) for line in axes.lines]
+    ([50.0, 70.0, 52.5], [[0.0, 0.0], [-30.0, -30.0], [50.0, 50.0]])
+    """
     slider = problem.specimen
     assert isinstance(slider, Slider)  # `problem.rig` has refused other specimens
     length, height, base = problem.interface.measure * scale, slider.height * scale, slider.base
@@ -290,6 +381,23 @@ def curve_of(result: xr.Dataset) -> tuple[Array, Array, str, str]:
     """Return travel (m), force (N), the name of the force, and the name of the force at events.
 
     If the thickness is unknown, the force is the mean stress (Pa).
+
+    An event at the load 2 begins at the travel 0.3 and the force 20, and ends at
+    the travel 0.35 and the force 13. The curve holds both between the loads:
+
+    >>> path = xr.Dataset({
+    ...     "travel": ("load", [0.1, 0.2, 0.5]), "force": ("load", [10.0, 15.0, 18.0]),
+    ...     "mean_stress": ("load", [1.0, 1.5, 1.8]), "event_load": ("event", [2.0]),
+    ...     "event_start": ("event", [0.0]), "event_travel": ("event", [0.3]),
+    ...     "event_travel_step": ("event", [0.05]), "event_force": ("event", [20.0]),
+    ...     "event_force_drop": ("event", [7.0]), "event_stress": ("event", [2.0]),
+    ...     "event_stress_drop": ("event", [0.75])}, {"load": [1.0, 2.0, 3.0]})
+    >>> travel, force, name, event = curve_of(path)
+    >>> travel.round(6).tolist(), force.tolist(), name, event
+    ([0.1, 0.2, 0.3, 0.35, 0.5], [10.0, 15.0, 20.0, 13.0, 18.0], 'force', 'event_force')
+    >>> _, force, name, event = curve_of(path.drop_vars("force"))
+    >>> force.tolist(), name, event
+    ([1.0, 1.5, 2.0, 1.25, 1.8], 'mean_stress', 'event_stress')
     """
     need(result, "travel", "event_start", hint=". Give the path of a specimen")
     name = "force" if "force" in result else "mean_stress"
@@ -304,7 +412,27 @@ def curve_of(result: xr.Dataset) -> tuple[Array, Array, str, str]:
 
 
 def _draw_band(axes: Axes, paths: Sequence[Any], length: float, factor: float) -> None:
-    """Draw a band with 90 % of several curves, up to the travel at which half have slid."""
+    """Draw a band with 90 % of several curves, up to the travel at which half have slid.
+
+    Curves rise by 1, 2, ... 101 over their travel 1, and by less than a half of
+    them are longer. At the travel 0.5 a load is not known:
+
+    >>> axes = new_figure(3.0, 2.0).subplots()
+    >>> travel = np.array([0.0, 0.5, 1.0, 3.0])
+    >>> force = np.array([0.0, np.nan, 1.0, 3.0])
+    >>> sizes = {k: 4 if k > 60 else 3 for k in range(1, 102)}
+    >>> paths = [(travel[:size], k * force[:size], "", "") for k, size in sizes.items()]
+    >>> _draw_band(axes, paths, 1e3, 0.1)
+    >>> (middle,) = axes.lines
+    >>> middle.get_xdata()[[0, -1]].tolist(), round(float(middle.get_ydata()[-1]), 6)
+    ([0.0, 1000.0], 5.1)
+    >>> (band,) = axes.collections
+    >>> ends = band.get_paths()[0].vertices
+    >>> ends[ends[:, 0] == 1000.0, 1].min().round(6).tolist(), ends[:, 1].max().round(6).tolist()
+    (0.6, 9.6)
+    >>> band.get_label()
+    '90 % of 101 predicted'
+    """
     known = [np.isfinite(travel) & np.isfinite(force) for travel, force, *_ in paths]
     ends = [travel[there].max() for (travel, *_), there in zip(paths, known, strict=True)]
     grid = np.linspace(0.0, float(np.median(ends)), 400)
