@@ -105,7 +105,7 @@ def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
 
     The step is `courant` times the stability limit.
 
-    >>> import stiction as st
+    >>> import dataclasses, stiction as st
     >>> blocks = st.Blocks(height=0.03, drive=st.Pusher(height=0.01, width=0.01, side="right"))
     >>> problem = st.Problem(
     ...     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0),
@@ -122,9 +122,16 @@ def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
     >>> bool(mesh.window == np.ceil(2.0 * 0.1 / 1000.0 / mesh.step)), mesh.correction.dtype.name
     (True, 'float32')
     >>> thin, c_d = np.diff(mesh.heights).min(), 1000.0 * 3.0**0.5
+    >>> both = condensed(mesh, 16)[0] + mesh.correction
+    >>> np.allclose(both, problem.blocks.stiffness, rtol=1e-5, atol=1e-6 * both.max())
+    True
     >>> half = make_mesh(problem, 0.45).step / mesh.step
     >>> round(half, 6), bool(0.0 < mesh.step < 0.9 * thin / c_d)
     (0.5, True)
+    >>> blocks = st.Blocks(height=0.03, thickness=0.005, drive=st.Platen(stiffness=1e6, mass=0.2))
+    >>> driven = make_mesh(dataclasses.replace(problem, specimen=blocks))
+    >>> driven.platen, driven.stiffness, driven.drive_mass, bool(driven.push.any())
+    (True, 400000000.0, 40.0, False)
     """
     assert problem.specimen is not None
     return _mesh(problem.specimen, problem.interface, problem.solid, problem.mode, courant)
@@ -422,6 +429,24 @@ def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
     >>> print(f"{np.abs(static.sum(axis=0)).max():.9f} {np.abs(static - static.T).max():.9f}")
     0.000000000 0.000000000
     >>> bool(static.diagonal().min() > 0.0 > static[0, 1])
+    True
+
+    In mode II, the stiffness matrix without the platen's u and the v of the
+    interface gives the same.
+
+    >>> elements, strips = _elements(np.array([0.5]), 0.25, solid, False)
+    >>> fields = {"elements": elements, "strips": strips, "heights": mesh.heights[[0, 2]] / 1.5}
+    >>> fields |= {"anti_plane": False, "platen": True, "push": mesh.push, "spacing": 0.25}
+    >>> static, profile, C = condensed(SimpleNamespace(**fields), 4)
+    >>> K = layer_matrix(SimpleNamespace(**fields), 0, 4).toarray()
+    >>> moves = np.eye(16)[:, 4:9]
+    >>> moves[8:12, 4] = 1.0
+    >>> flexibility = np.linalg.inv(moves.T @ K @ moves)
+    >>> schur = K[:4, :4] - K[:4] @ moves @ flexibility @ moves.T @ K[:, :4]
+    >>> np.allclose(static, 0.5 / 0.25 * schur), np.allclose(C * flexibility[4, 4], 1.0)
+    (True, True)
+    >>> force = -K[:4] @ moves @ flexibility[:, 4]
+    >>> np.allclose(profile, 4.0 * force / force.sum())
     True
     """
     static, force, compliance = np.zeros((nodes, nodes)), np.zeros(nodes), 0.0

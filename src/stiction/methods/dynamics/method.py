@@ -50,7 +50,16 @@ _UNKNOWN_AT_ONSET = (
 
 
 def _load_history(load: Any) -> PiecewiseLinear | None:
-    """Return the load history for samples (times, values) in s and Pa, or raise an `InputError`."""
+    """Return the load history for samples (times, values) in s and Pa, or raise an `InputError`.
+
+    >>> history = _load_history(([0, 1, 3], [0, 2e6, 1e6]))
+    >>> history.at.tolist(), history.values.tolist(), _load_history(None)
+    ([0.0, 1.0, 3.0], [0.0, 2000000.0, 1000000.0], None)
+    >>> _load_history(([0, 1, 1], [0, 2e6, 1e6]))
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: times must begin at 0 s and increase
+    """
     if load is None:
         return None
     try:
@@ -161,7 +170,19 @@ class Rupture(Listed):
         return self
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """Return the approximate time for a sample on a core, s."""
+        """Return the approximate time for a sample on a core, s.
+
+        >>> from types import SimpleNamespace
+        >>> def seconds(shape, drive=None, **options):
+        ...     interface = SimpleNamespace(shape=shape, size=int(np.prod(shape)))
+        ...     specimen = drive and SimpleNamespace(drive=SimpleNamespace(type=drive))
+        ...     problem = SimpleNamespace(interface=interface, specimen=specimen)
+        ...     return round(Rupture(**options).seconds_per_sample(problem), 9)
+        >>> seconds((2048,)), seconds((2048,), start="rest"), seconds((128, 256))
+        (0.208, 0.408, 6.0)
+        >>> seconds((256,), drive="platen"), seconds((256,), drive="pusher")
+        (0.08, 1.2)
+        """
         shape = problem.interface.shape
         if problem.specimen is not None:
             drive = problem.specimen.drive
@@ -189,6 +210,18 @@ class Rupture(Listed):
         below the stress of the first slip, unless the interface ends:
         then slip lowers the mean stress of the part that can break.
         Specimens are in equilibrium up to each event.
+
+        >>> from types import SimpleNamespace
+        >>> cases = [(True, None, False), (False, None, False), (False, 1, False), (False, 1, True)]
+        >>> for held, specimen, machine in cases:
+        ...     problem = SimpleNamespace(specimen=specimen, has_machine=machine)
+        ...     problem.interface = SimpleNamespace(is_held=held)
+        ...     events = "first_instability", "critical_stress"
+        ...     print(*(Rupture().bounded_by_strength(problem, event) for event in events))
+        (False, False) (False, False)
+        (True, False) (True, False)
+        (True, True) (True, True)
+        (False, False) (True, True)
         """
         if problem.interface.is_held:
             return False, False
@@ -282,7 +315,34 @@ class Rupture(Listed):
 def make_run(
     method: Rupture, medium: Medium, rows: Sample, row: int, stations: Ints = NO_STATIONS
 ) -> Run:
-    """Return the run for a sample, which records every step at the nodes `stations`."""
+    """Return the run for a sample, which records every step at the nodes `stations`.
+
+    The load turns at 2 and 3 s. Half a metre of slip is d_c where the
+    strength falls by 1 Pa at 2 Pa/m.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> parts = {"_thresholds": lambda *others: "thresholds", "_least_load": lambda *others: 0.25}
+    >>> plain = FunctionType(make_run.__code__, globals() | parts, None, make_run.__defaults__)
+    >>> friction = SimpleNamespace(parameters="law", reach=2.0)
+    >>> friction.critical_slip_of = lambda drop, rate: drop / rate
+    >>> medium = SimpleNamespace(grid="grid", problem=SimpleNamespace(friction=friction))
+    >>> rows = SimpleNamespace(
+    ...     strength=np.array([[9.0, 9.0], [3.0, np.inf]]), residual_strength=np.full((2, 2), 2.0),
+    ...     weakening_rate=np.array([[1.0, 1.0], [2.0, 2.0]]), load_profile=np.array([1.5, 0.5]),
+    ...     initial_stress=np.array([[0.0, 0.0], [0.25, 0.75]]),
+    ...     part=lambda some: SimpleNamespace(steepest_weakening_rate=(some.start, some.stop)),
+    ... )
+    >>> history = ([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 3.0, 5.0, 4.0, 6.0])
+    >>> run = plain(Rupture(load_history=history, stop="rest"), medium, rows, 1)
+    >>> setting = run.setting
+    >>> setting.turning_times.tolist(), setting.nodes.residual_slip.tolist()
+    ([2.0, 3.0], [1.0, inf])
+    >>> setting.mean_profile, setting.mean_initial, run.steepest_weakening_rate, run.stop
+    (1.5, 0.25, (1, 2), 'rest')
+    >>> load = plain(Rupture(loading_rate=7.0), medium, rows, 0).setting.load
+    >>> load.at.tolist(), load.values.tolist()
+    ([0.0, 1.0], [0.0, 7.0])
+    """
     strength, residual = rows.strength[row], rows.residual_strength[row]
     W, initial = rows.weakening_rate[row], rows.initial_stress[row]
     # Unbreakable nodes have an infinite strength, and an infinite
@@ -321,7 +381,22 @@ def make_run(
 
 
 def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
-    """Return the mean load, Pa, at which the weakest nodes of half a nucleation length slip."""
+    """Return the mean load, Pa, at which the weakest nodes of half a nucleation length slip.
+
+    Half the nucleation length covers three nodes. They slip at 3, 5 and 7 Pa
+    at least. One node never weakens, and one cannot break.
+
+    >>> from types import SimpleNamespace
+    >>> medium = SimpleNamespace(interface=SimpleNamespace(cell=0.1), problem=SimpleNamespace())
+    >>> medium.problem.half_spaces = SimpleNamespace(nucleation_lengths=lambda rate: (1.2 / rate,))
+    >>> nodes = SimpleNamespace(peak=np.array([11.0, 4.5, 8.0, 4.0, 1.0, np.inf]), initial=1.0)
+    >>> nodes.profile = np.array([2.0, 0.5, 1.0, 1.0, 1.0, 1.0])
+    >>> nodes.residual_slip = np.array([1.0, 1.0, 1.0, 1.0, 0.0, np.inf])
+    >>> _least_load(medium, nodes, 2.0), _least_load(medium, nodes, 200.0)  # 3, 5, 7 Pa; 3 Pa
+    (5.0, 3.0)
+    >>> _least_load(medium, nodes, 0.2)  # all four
+    5.5
+    """
     interface = medium.interface
     # Half the nucleation length of a line. On a plane, half the lengths
     # along x and y multiplied.
@@ -341,6 +416,43 @@ def _thresholds(
     A run is calm if, while shear waves cross the part that can break,
     no node slips faster than in a crack with half its length that only
     the load drives, or if no node slips faster than before.
+
+    Waves cross half the period in 500 steps. The median drop is 5 Pa,
+    of which 0.075 over Z are an instability.
+
+    >>> from types import SimpleNamespace
+    >>> import stiction as st
+    >>> def thresholds(load=(0.0, 9.0), residual=1.0, peak=(5.0, 6.0, np.inf, 8.0), **options):
+    ...     solid = SimpleNamespace(shear_wave_speed=2.0)
+    ...     problem = SimpleNamespace(effective_modulus=8.0, solid=solid)
+    ...     problem.friction = st.LinearWeakening(weakening_rate=1.0)
+    ...     interface = SimpleNamespace(lengths=(0.8, 0.2), reach=0.4, size=8)
+    ...     medium = SimpleNamespace(problem=problem, interface=interface, step=1e-4, impedance=3.0)
+    ...     medium.grid = SimpleNamespace(frequency=np.array([0.0, 40.0 * np.pi, 20.0 * np.pi]))
+    ...     nodes = SimpleNamespace(peak=np.array(peak), residual=np.full(4, residual))
+    ...     nodes.profile, nodes.initial = np.full(4, 0.5), np.full(4, 0.25)
+    ...     history = PiecewiseLinear(np.array([0.0, 1.0]), np.array(load))
+    ...     return _thresholds(Rupture(**options), medium, nodes, history)
+    >>> found = thresholds(arrival=0.25)
+    >>> found.calm_count, found.breakable, found.period_nodes, found.held, found.slid_stop
+    (500, 3, 6, True, True)
+    >>> [round(value, 9) for value in (found.calm_slip, found.settling_time, found.front_share)]
+    [0.05, 0.2, 0.25]
+    >>> round(found.unstable_slip_rate, 9), round(found.smallest_step, 9), found.end_time
+    (0.125, 0.0006, inf)
+    >>> found.explicit_only, found.curved, found.event_stop, found.rest_stop
+    (False, False, False, False)
+
+    An interface that slides, and is unloaded or held up by less than its
+    residual strength, may come to rest.
+
+    >>> whole = {"peak": (5.0, 6.0, 7.0, 8.0), "stop": "rest"}
+    >>> falls = {"load": (9.0, 8.9)}
+    >>> cases = [{}, falls, {"residual": 5.0}, falls | {"stop": "sliding"}]
+    >>> [thresholds(**whole | case).slid_stop for case in cases]
+    [True, False, False, True]
+    >>> thresholds(stop="time", end_time=2.0).slid_stop, thresholds(**whole).period_nodes
+    (False, 8)
     """
     friction, finite = medium.problem.friction, np.isfinite(nodes.peak)
     held = not finite.all()

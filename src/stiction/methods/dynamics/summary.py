@@ -70,6 +70,12 @@ def scalars(interface: Interface) -> dict[str, Variable]:
     apparent speed of a front that arrives at an angle can exceed all
     wave speeds. On a line this happens only if a long part breaks
     almost at once.
+
+    >>> line, plane = scalars(Interface(0.8, 8)), scalars(Interface((0.8, 0.8), (8, 8)))
+    >>> sorted({*line} - {*plane}), line["seismic_moment"].units, plane["seismic_moment"].units
+    (['rupture_speed'], 'N', 'N m')
+    >>> line["median_rupture_speed"].dims, plane["median_rupture_speed"].dims
+    (('sample',), ('sample', 'direction'))
     """
     variables = {name: per_area(interface, variable) for name, variable in _SCALARS.items()}
     if interface.is_plane:
@@ -88,6 +94,30 @@ def rate_spectrum(
     with straight lines between the times (s), from one period in all to
     the waves that the nodes and times resolve. The spectrum is empty
     with fewer than three times.
+
+    The integral over many points agrees. The times from 1 to 4 s give
+    frequencies from 1/3 Hz to 2/3 Hz. Nodes that are 0.1 m apart resolve waves
+    up to 4/0.8 = 5 Hz, if the steps are short enough.
+
+    >>> from types import SimpleNamespace
+    >>> problem = SimpleNamespace(interface=Interface(0.8, 8))
+    >>> problem.solid = SimpleNamespace(shear_wave_speed=4.0)
+    >>> time, rate = np.array([1.0, 2.0, 4.0]), np.array([1.0, 3.0, 2.0])
+    >>> (f, _), (amplitude, variable) = rate_spectrum(problem, time, rate)
+    >>> print(f"{f[0]:.6f} {f[-1]:.6f} {f.size} {variable.units}")
+    0.333333 0.666667 100 N
+    >>> t = 1.0 + 3.0 * (np.arange(3000) + 0.5) / 3000
+    >>> waves = [np.exp(-2j * np.pi * f[i] * t) for i in (0, 60)]
+    >>> integrals = [abs(3.0 * np.mean(np.interp(t, time, rate) * wave)) for wave in waves]
+    >>> np.allclose(amplitude[[0, 60]], integrals, rtol=1e-5)
+    True
+    >>> for count in (3001, 19, 2):  # steps of 1 ms and 1/6 s; too few times
+    ...     fine = np.linspace(1.0, 4.0, count)
+    ...     (f, _), (amplitude, _) = rate_spectrum(problem, fine, np.ones(count))
+    ...     print(f.size, f[-1:].round(6).tolist())
+    100 [5.0]
+    100 [3.0]
+    0 []
     """
     frequencies = np.empty(0)
     if time.size > 2:
@@ -122,6 +152,28 @@ def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[s
     Waves carry away the work minus the work of friction and the strain
     energy. The stress of a slipping node equals its strength, so the
     work of friction follows from the slip alone.
+
+    The strain energy is half the work of K d on the slip d. Slip beyond d_c
+    dissipates above the residual strength only drop²/(2 W). The last node
+    cannot break.
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.elasticity.operator import make_transform
+    >>> from stiction.problem.friction import LinearWeakening
+    >>> problem = SimpleNamespace(friction=LinearWeakening(weakening_rate=1.0))
+    >>> medium = SimpleNamespace(problem=problem)
+    >>> medium.grid = SimpleNamespace(transform=make_transform((6,)), cell=0.25)
+    >>> medium.grid.stiffness = np.array([[9.0, 1.0, 2.0, 5.0]])
+    >>> nodes = SimpleNamespace(residual=np.full(6, 2.0), weakening_rate=np.full(6, 4.0))
+    >>> nodes.peak = np.append(np.full(5, 8.0), np.inf)
+    >>> slip = np.array([0.5, 2.0, 0.0, 0.0, 1.0, 0.0])
+    >>> run = SimpleNamespace(medium=medium, setting=SimpleNamespace(nodes=nodes))
+    >>> energies = _energies(run, slip, np.fft.rfft(slip), 50.0)
+    >>> fracture = 0.25 * ((6.0 * 0.5 - 2.0 * 0.25) + 36.0 / 8.0 + (6.0 * 1.0 - 2.0))
+    >>> stress = np.fft.irfft(np.fft.rfft(slip) * [0.0, 1.0, 2.0, 5.0], 6)
+    >>> strain, residual = 0.5 * 0.25 * slip @ stress, 0.25 * 2.0 * 3.5
+    >>> np.allclose([*energies.values()], [strain, fracture, 50.0 - strain - fracture - residual])
+    True
     """
     nodes, grid, friction = run.setting.nodes, run.medium.grid, run.medium.problem.friction
     # Unbreakable nodes have infinite strength and dissipate no energy.
@@ -140,7 +192,28 @@ def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[s
 
 
 def arrested_events(run: Run) -> list[ArrestedEvent]:
-    """Return the events in a run so far, with the variables that only inertia provides."""
+    """Return the events in a run so far, with the variables that only inertia provides.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> from stiction.methods.dynamics.state import event_type
+    >>> def energies(run, slip, slip_hat, work):
+    ...     return {"radiated_energy": work + slip_hat[0].real}
+    >>> plain = FunctionType(arrested_events.__code__, globals() | {"_energies": energies})
+    >>> record = np.zeros((), event_type(8))
+    >>> record["time"], record["node"], record["settled"], record["duration"] = 3.0, 5, 1, 0.5
+    >>> record["load"], record["work"], record["slip"][1] = (7.0, 8.0), (10.0, 14.0), 0.25
+    >>> run = SimpleNamespace(medium=SimpleNamespace(interface=Interface(0.8, 8)), events=[record])
+    >>> ((before, after, known),) = plain(run)
+    >>> before.load, after.load, float(after.slip.sum()), float(before.slip.sum())
+    (7.0, 8.0, 2.0, 0.0)
+    >>> for name, value in known.items():
+    ...     print(name, np.round(value, 6).tolist())
+    event_time 3.0
+    event_settled 1.0
+    event_hypocentre [0.5]
+    event_duration 0.5
+    event_radiated_energy 6.0
+    """
     interface, events = run.medium.interface, []
     for record in run.events:
         # The state before the event, and the state after it.
@@ -162,7 +235,23 @@ def arrested_events(run: Run) -> list[ArrestedEvent]:
 
 
 def _speeds(run: Run, state: RuptureState) -> dict[str, list[float]]:
-    """Return the speeds of the front, m/s, along each axis on the line through the onset."""
+    """Return the speeds of the front, m/s, along each axis on the line through the onset.
+
+    On this plane the front leaves node (5, 9) with 2 m/s along x and 3 m/s
+    along y.
+
+    >>> from types import SimpleNamespace
+    >>> plane = Interface((32.0, 32.0), (32, 32))
+    >>> x, y = (np.abs(np.arange(32.0) - at) for at in (5, 9))
+    >>> arrival = np.minimum(x, 32.0 - x)[:, None] / 2.0 + np.minimum(y, 32.0 - y) / 3.0
+    >>> problem = SimpleNamespace(nucleation_lengths=lambda rate: (8.0, 8.0))
+    >>> run = SimpleNamespace(medium=SimpleNamespace(interface=plane, problem=problem))
+    >>> run.steepest_weakening_rate = 1.0
+    >>> state = SimpleNamespace(arrival=arrival.ravel())
+    >>> state.now = {"results": {"onset_node": 5 * 32 + 9}}
+    >>> np.round(_speeds(run, state)["median_rupture_speed"], 6).tolist()
+    [2.0, 3.0]
+    """
     interface = run.medium.interface
     nucleation = run.medium.problem.nucleation_lengths(run.steepest_weakening_rate)
     arrival = state.arrival.reshape(interface.shape)
@@ -176,7 +265,22 @@ def _speeds(run: Run, state: RuptureState) -> dict[str, list[float]]:
 
 
 def _critical_load(run: Run, now: Any) -> float:
-    """Return the load, Pa, that carries the critical stress, or NaN after an overstressed start."""
+    """Return the load, Pa, that carries the critical stress, or NaN after an overstressed start.
+
+    The mean stress 7 Pa is tau_0 2 + 1 Pa. If the run began with stress above
+    the strength, a load above the load at the start is still known.
+
+    >>> from types import SimpleNamespace
+    >>> def critical(start_load, peak):
+    ...     nodes = SimpleNamespace(peak=np.array([9.0, peak]), profile=np.array([1.0, 3.0]))
+    ...     nodes.initial = np.array([0.0, 2.0])
+    ...     setting = SimpleNamespace(nodes=nodes, mean_initial=1.0, mean_profile=2.0)
+    ...     now = {"run": {"scale": 10.0, "start_load": start_load}}
+    ...     now["results"] = {"onset_stress": 7.0}
+    ...     return _critical_load(SimpleNamespace(setting=setting), now)
+    >>> critical(3.0, 11.0), critical(2.9, 10.6), critical(3.0, 10.9)
+    (3.0, 3.0, nan)
+    """
     nodes, margin = run.setting.nodes, 1e-6 * now["run"]["scale"]
     stress = float(now["results"]["onset_stress"])
     # Without slip the mean stress is tau_0 <p> + <tau_i>.
@@ -188,7 +292,37 @@ def _critical_load(run: Run, now: Any) -> float:
 
 
 def summary(run: Run, state: RuptureState) -> dict[str, Any]:
-    """Return the scalars of a finished run, with NaN for events that did not happen."""
+    """Return the scalars of a finished run, with NaN for events that did not happen.
+
+    Events that did not happen are NaN. A run to sliding in which not all
+    nodes have broken has no onset, but a first instability.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> from stiction.methods.dynamics.state import DIAGNOSTICS
+    >>> speeds = {"rupture_speed": [4.0], "median_rupture_speed": [2.0]}
+    >>> parts = {"_speeds": lambda run, state: speeds}
+    >>> parts["energy_balance"] = lambda run, state: dict(radiated_energy=8.0, fracture_energy=6.0)
+    >>> parts["_critical_load"] = lambda run, now: 33.0
+    >>> plain = FunctionType(summary.__code__, globals() | parts)
+    >>> problem = SimpleNamespace(solid=SimpleNamespace(shear_modulus=3.0))
+    >>> problem.interface, diagnostics = Interface(0.8, 8), np.zeros(1, DIAGNOSTICS)
+    >>> medium = SimpleNamespace(interface=problem.interface, problem=problem)
+    >>> results, run = diagnostics[0]["results"], SimpleNamespace(medium=medium)
+    >>> state = SimpleNamespace(now=diagnostics[0], slip=np.full(8, 0.5))
+    >>> names = ("critical_load", "critical_stress", "first_instability", "critical_position")
+    >>> names += ("onset_time", "stress_drop", "median_rupture_speed", "seismic_moment")
+    >>> results["first_stress"], results["critical_stress"] = 5.0, 7.0
+    >>> results["kinetic_stress"] = 4.0
+    >>> results["onset_time"], results["onset_node"] = 0.125, 3
+    >>> cases = (0, 1, "rest"), (1, 0, "sliding"), (1, 1, "sliding"), (1, 0, "rest")
+    >>> for instabilities, broken, run.stop in cases:
+    ...     results["instabilities"], results["all_broken"] = instabilities, broken
+    ...     print(*(f"{float(plain(run, state)[name]):.4g}" for name in names))
+    nan nan nan nan nan nan nan 1.2
+    nan nan 5 0.3 0.125 nan 2 1.2
+    33 7 5 0.3 0.125 3 2 1.2
+    33 7 5 0.3 0.125 nan 2 1.2
+    """
     interface, now = run.medium.interface, state.now
     results = now["results"]
     unstable, broken = results["instabilities"] > 0, bool(results["all_broken"])
@@ -232,6 +366,27 @@ def front_speeds(
     The names are the names in `SPEEDS`. `arrival` holds the arrival
     times (s) along `axis`, and `nucleation` is the nucleation length
     (m).
+
+    The front passes 16 nodes at 3 m/s, and others at 1 m/s. Over 2 h_n = 32 m it
+    takes 16 + 16/3 s at most.
+
+    >>> steps = np.where((np.arange(127) >= 40) & (np.arange(127) < 56), 1.0 / 3.0, 1.0)
+    >>> arrival = np.append(0.0, np.cumsum(steps))
+    >>> speeds = front_speeds(Interface(128.0, 128), 0, arrival, 16.0)
+    >>> [round(speeds[name], 6) for name in ("rupture_speed", "median_rupture_speed")]
+    [1.5, 1.0]
+
+    In a specimen, fronts do not pass from one end to the other, where they
+    would be faster here.
+
+    >>> arrival = (np.arange(128) + 64.0) % 128 + np.where(np.arange(128) < 64, -0.9, 0.0)
+    >>> for ends in ("periodic", "free"):
+    ...     interface = Interface(128.0, 128, ends=ends)
+    ...     print(f"{front_speeds(interface, 0, arrival, 16.0)['rupture_speed']:.6f}")
+    1.028939
+    1.000000
+    >>> front_speeds(interface, 0, np.full(128, np.nan), 16.0)["median_rupture_speed"]
+    nan
     """
     spacing, longest = interface.spacings[axis], 0.25 * interface.lengths[axis]
     front = {}
@@ -258,6 +413,23 @@ def rupture_speed(arrival: Floats, spacing: float, window: float) -> tuple[Float
     arrival is monotone over the window, and falls to 0 if the front goes
     back for the part `BACKWARDS` of the time. This excludes places where
     patches begin or fronts meet.
+
+    Over two spacings, the front takes 2 s at node 1 and 3 s at node 3. At nodes
+    0 and 7 it goes back. At node 4 it was not seen on one side.
+
+    >>> arrival = np.array([0.0, 1.0, 2.0, 4.0, 5.0, np.nan, 8.0, 9.0])
+    >>> speeds, weights = rupture_speed(arrival, 1.0, 2.0)
+    >>> speeds.round(4).tolist(), weights.round(4).tolist()
+    ([nan, 1.0, 0.6667, 0.6667, nan, nan, nan, nan], [0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+
+    The front goes back for 0.5 ms in 1 s, half as long as it may.
+
+    >>> arrival[1:4] = 3.0, 2.9995, 4.0
+    >>> _, weights = rupture_speed(arrival, 1.0, 2.0)
+    >>> round(float(weights[2]), 4)
+    0.5
+    >>> rupture_speed(arrival, 1.0, 8.0)[1].tolist() == [0.0] * 8  # a window of the whole line
+    True
     """
     # A window over more than the line would compare a front with itself.
     half = max(1, round(0.5 * window / spacing))

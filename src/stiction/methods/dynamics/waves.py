@@ -121,16 +121,18 @@ def _force(stencil: Any, x0: Any, x1: Any, x2: Any, y0: Any, y1: Any, y2: Any, F
 
     A unit displacement along the axis at node 1 of the row acts with the
     coefficients 2 and 5. One across the axis acts with 8, and at the ends
-    with 14.
+    with 14. The rows below and above have other coefficients.
 
     >>> stencil, zero = np.arange(1.0, 16.0).reshape(5, 3), np.zeros(4)
     >>> rows, F = np.eye(4), np.zeros(4)
-    >>> for places in ((1, rows[1]), (0, rows[0]), (4, rows[1]), (4, rows[0]), (5, rows[3])):
-    ...     fields = [places[1] if place == places[0] else zero for place in range(6)]
+    >>> for row, node in ((1, 1), (0, 0), (2, 3), (3, 1), (4, 1), (4, 0), (5, 3)):
+    ...     fields = [rows[node] if place == row else zero for place in range(6)]
     ...     _force.py_func(stencil, *fields, F)
     ...     print(F.tolist())
     [2.0, 5.0, 2.0, 0.0]
     [10.0, 1.0, 0.0, 0.0]
+    [0.0, 0.0, 3.0, 12.0]
+    [7.0, 0.0, -7.0, 0.0]
     [8.0, 0.0, -8.0, 0.0]
     [14.0, -8.0, 0.0, 0.0]
     [0.0, 0.0, 9.0, -15.0]
@@ -191,32 +193,32 @@ def _slide(
 
     Return the number of nodes that never slipped.
 
-    Node 0 would move at 0.9 * 0.2 + 0.5 * (1 + 0.5 * 3) m/s without friction.
-    Its strength, 2 Pa, leaves 0.93 m/s. Node 1 sticks, and node 2 stops.
+    Node 1 would move at 0.9 * 0.2 + 0.5 * (1 + 0.5 * 3) m/s without friction.
+    Its strength, 2 Pa, leaves 0.93 m/s. Node 0 sticks, and node 2 stops.
 
     >>> from types import FunctionType, SimpleNamespace
-    >>> strength = {"strength_at": lambda sample, slip, i: (2.0, 9.0, 5.0)[i]}
+    >>> strength = {"strength_at": lambda sample, slip, i: (9.0, 2.0, 5.0)[i]}
     >>> plain = FunctionType(_slide.py_func.__code__, globals() | strength)
     >>> mesh = SimpleNamespace(spacing=0.5, step=0.1, viscous_time=0.02)
-    >>> mesh.correction = np.array([[1.0, 2.0, 4.0], [8.0, 8.0, 8.0], [9.0, 9.0, 9.0]])
+    >>> mesh.correction = np.array([[8.0, 8.0, 8.0], [1.0, 2.0, 4.0], [9.0, 9.0, 9.0]])
     >>> waves = SimpleNamespace(
-    ...     slip=np.array([0.1, 0.0, 0.5]), slip_rate=np.full(3, 7.0), stress=np.zeros(3),
+    ...     slip=np.array([0.0, 0.1, 0.5]), slip_rate=np.full(3, 7.0), stress=np.zeros(3),
     ...     corrected=np.array([1.0, 1.0, 2.0]), arrival=np.full(3, np.nan), u=np.zeros((2, 3)),
-    ...     u_rate=np.array([[0.2, 0.0, 0.4]]), totals=np.zeros(1, TOTALS).view(np.recarray),
+    ...     u_rate=np.array([[0.0, 0.2, 0.4]]), totals=np.zeros(1, TOTALS).view(np.recarray),
     ... )
     >>> now = waves.totals[0]
     >>> now.time, now.fast_slip_rate = 5.0, 1.5
-    >>> start, front, force = np.array([4.0, 4.0, 1.0]), np.full(3, 0.2), np.array([1.0, -1.0, 0.0])
+    >>> start, front, force = np.array([4.0, 4.0, 1.0]), np.full(3, 0.2), np.array([-1.0, 1.0, 0.0])
     >>> int(plain(None, start, front, mesh, waves, force, 0.9, 0.5))  # a node that never slipped
     1
     >>> waves.slip.round(6).tolist(), waves.slip_rate.round(6).tolist()
-    ([0.286, 0.0, 0.5], [1.86, 0.0, 0.0])
+    ([0.0, 0.286, 0.5], [0.0, 1.86, 0.0])
     >>> waves.stress.round(6).tolist()
-    [2.0, 1.0, 0.44]
+    [1.0, 2.0, 0.44]
     >>> waves.arrival.round(6).tolist()  # 5 + 0.1 * 0.1/0.186
-    [5.053763, nan, nan]
+    [nan, 5.053763, nan]
     >>> waves.u[0].round(6).tolist(), waves.u_rate[0].round(6).tolist()
-    ([0.1076, 0.0, -0.008], [0.93, 0.0, 0.0])
+    ([0.0, 0.1076, -0.008], [0.0, 0.93, 0.0])
     >>> waves.corrected.round(6).tolist(), round(float(now.friction), 6)  # 0.0565 + 0.0044
     ([1.186, 1.372, 2.744], 0.0609)
     >>> [round(float(now[name]), 6) for name in ("peak_rate", "fast_since", "fast_until", "fast")]
