@@ -302,6 +302,30 @@ class LocalCriterion(Listed):
 
         Raises an `InputError` if the weakening rate varies along the
         interface, or if a critical patch does not fit on it.
+
+        On a plane with uniform strengths, the load is the strength less the
+        initial stress. The second sample weakens 1.5 times as fast, so its patch
+        is about two thirds as long.
+
+        >>> import numpy as np, stiction as st
+        >>> problem = st.Problem(
+        ...     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0),
+        ...     interface=st.Interface((0.1, 0.1), (64, 64)),
+        ...     friction=st.LinearWeakening(), load=st.Load(initial_stress=3e5),
+        ... )
+        >>> rates = np.array([1e11, 1.5e11])[:, None, None] * np.ones((2, 64, 64))
+        >>> strength = np.array([1e6, 2e6])[:, None, None] * np.ones((2, 64, 64))
+        >>> profiles = {"strength": strength, "weakening_rate": rates}
+        >>> values = LocalCriterion().prepare(problem)(problem.sample(profiles))
+        >>> (values["critical_load"] / 1e5).round(6).tolist(), values["critical_position"].shape
+        ([7.0, 17.0], (2, 2))
+        >>> (values["critical_stress"] / 1e5).round(6).tolist()
+        [10.0, 20.0]
+        >>> extent, aspect = values["critical_patch_extent"], values["critical_aspect"]
+        >>> np.allclose(extent[:, 0], aspect * extent[:, 1])
+        True
+        >>> bool(1.4 < extent[0, 1] / extent[1, 1] < 1.6)
+        True
         """
         check_law(problem)
         interface = problem.interface
@@ -334,7 +358,38 @@ class LocalCriterion(Listed):
 
 
 def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
-    """Return the onset of each specimen, at its weakest position."""
+    """Return the onset of each specimen, at its weakest position.
+
+    The weakest window has three nodes and begins at node 2. The relief counts
+    only if the machine has a stiffness.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> names = {"_warn_if_coarse": lambda *given: None}
+    >>> names["_relief_of_patch"] = lambda *given: given[1] + 0.5
+    >>> names["weakest_window"] = lambda excess, *given: (excess.min(), 1, 2)
+    >>> plain = FunctionType(_onset_of_specimen.__code__, globals() | names)
+    >>> interface = SimpleNamespace(spacing=0.25, size=6, is_held=False)
+    >>> windows = SimpleNamespace(starts=np.arange(2), widths=np.array([2, 3]))
+    >>> blocks = SimpleNamespace(windows=lambda *rates: windows, relief=1.0)
+    >>> sample = SimpleNamespace(
+    ...     strength=np.full((2, 6), 9.0), samples=2,
+    ...     initial_stress=np.array([[1.0] * 6, [2.0] * 6]),
+    ...     weakening_rate=np.array([[3.0] * 6, [4.0] * 6]), uniform_weakening=True,
+    ...     load_profile=np.ones(6), mean_stress=lambda load: 2.0 * load,
+    ... )
+    >>> problem = SimpleNamespace(interface=interface, blocks=blocks)
+    >>> values = plain(problem, sample)
+    >>> values["critical_load"].tolist(), values["critical_stress"].tolist()
+    ([8.0, 7.0], [9.0, 5.0])
+    >>> values["critical_position"].tolist(), values["critical_patch_length"].tolist()
+    ([0.875, 0.875], [0.75, 0.75])
+    >>> blocks.relief = 0.0
+    >>> plain(problem, sample)["critical_stress"].tolist()
+    [16.0, 14.0]
+    >>> interface.is_held = True
+    >>> plain(problem, sample)["critical_stress"].tolist()
+    [9.0, 5.0]
+    """
     _warn_if_coarse(problem, sample)
     excess, spacing = excess_of(sample), problem.interface.spacing
     # The weakest window of each sample: its load, its first node, and

@@ -447,6 +447,54 @@ def implicit_steps(
 
     The parameters are described in `explicit_steps`. `stepping.phase`
     is IMPLICIT.
+
+    The parts of a step are replaced here. Each attempt has a scripted effect:
+    the weakening, and whether a solution was found and the interface
+    accelerates.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> from stiction.methods.dynamics.state import DIAGNOSTICS, PiecewiseLinear
+    >>> def taken(effects, fall=0.0, weakened=0, total=1.0, end_time=99.0, **changed):
+    ...     def choose(now, setting, step):
+    ...         tried.append(float(step))
+    ...         last = now.step.time + step > end_time
+    ...         return (end_time - now.step.time if last else step), step, last, last
+    ...     def accept(state, setting, tables, attempt):
+    ...         ratios.append(round(float(attempt.ratio), 6))
+    ...         return 3.0
+    ...     def finish_step(state, setting, done, record, row):
+    ...         now.step.time, now.step.load = done.time, done.load
+    ...         return fall
+    ...     tried, ratios, diagnostics = [], [], np.zeros(1, DIAGNOSTICS).view(np.recarray)
+    ...     names = {"_choose_size": choose, "_accept": accept, "finish_step": finish_step}
+    ...     names |= {"_next_size": _next_size.py_func, "_assemble": lambda *given: 0.0}
+    ...     names["solve_increment"] = lambda *given: effects[len(tried) - 1] is not None
+    ...     names["_effect"] = lambda *given: (effects[len(tried) - 1], total, 0.0)
+    ...     names["_accelerates"] = lambda *given: effects[len(tried) - 1] == 0.03
+    ...     now, thresholds = diagnostics[0], {"slid_stop": True, "event_stop": True}
+    ...     thresholds |= {"breakable": 2, "end_time": end_time, "smallest_step": 0.3}
+    ...     thresholds |= {"slip_step": 0.02, "curved": False} | changed
+    ...     now.run.scale, now.stepping.next_size, now.step.weakened_nodes = 1e4, 1.0, weakened
+    ...     load = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, 2.0]))
+    ...     setting = SimpleNamespace(load=load, thresholds=SimpleNamespace(**thresholds))
+    ...     problem = SimpleNamespace(increment=np.zeros(2))
+    ...     tables = SimpleNamespace(problem=problem, strength=None)
+    ...     state = SimpleNamespace(diagnostics=diagnostics, slip=None)
+    ...     plain = FunctionType(implicit_steps.py_func.__code__, globals() | names)
+    ...     count, reason = plain(3, state, setting, tables, None)
+    ...     return int(count), Reason(reason).name, np.round(tried, 4).tolist(), ratios
+    >>> taken([0.021, 0.004, 0.019])
+    (3, 'DONE', [1.0, 0.7071, 1.4142], [0.0, 0.414214, 0.666667])
+    >>> taken([0.041, 0.019, 0.019, 0.019]), taken([0.019, None, 0.019, 0.03, 0.019])[2]
+    ((3, 'DONE', [1.0, 0.5, 0.5, 0.5], [0.0, 0.5, 0.5]), [1.0, 1.0, 0.5, 0.5])
+    >>> taken([None, None]), taken([0.019], total=np.nan)[:2]
+    ((0, 'TO_EXPLICIT', [1.0, 0.5], []), (0, 'NOT_FINITE'))
+    >>> taken([0.019], weakened=2)[:2], taken([0.019], fall=1.1)[:2]
+    ((1, 'ALL_SLID'), (1, 'DROPPED'))
+    >>> taken([0.019] * 3, fall=0.9)[:2]
+    (3, 'DONE')
+    >>> taken([0.019] * 3, end_time=1.5)
+    (2, 'DONE', [1.0, 1.0], [0.0, 0.333333])
     """
     now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.problem.increment
     stepping = now.stepping

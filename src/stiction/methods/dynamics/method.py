@@ -327,7 +327,8 @@ def make_run(
     >>> friction.critical_slip_of = lambda drop, rate: drop / rate
     >>> medium = SimpleNamespace(grid="grid", problem=SimpleNamespace(friction=friction))
     >>> rows = SimpleNamespace(
-    ...     strength=np.array([[9.0, 9.0], [3.0, np.inf]]), residual_strength=np.full((2, 2), 2.0),
+    ...     strength=np.array([[9.0, 9.0], [3.0, np.inf]]),
+    ...     residual_strength=np.array([[5.0, 5.0], [2.0, 2.0]]),
     ...     weakening_rate=np.array([[1.0, 1.0], [2.0, 2.0]]), load_profile=np.array([1.5, 0.5]),
     ...     initial_stress=np.array([[0.0, 0.0], [0.25, 0.75]]),
     ...     part=lambda some: SimpleNamespace(steepest_weakening_rate=(some.start, some.stop)),
@@ -453,6 +454,8 @@ def _thresholds(
     [True, False, False, True]
     >>> thresholds(stop="time", end_time=2.0).slid_stop, thresholds(**whole).period_nodes
     (False, 8)
+    >>> thresholds(stop="rest", **falls).slid_stop  # held, so slip comes to rest anyway
+    True
     """
     friction, finite = medium.problem.friction, np.isfinite(nodes.peak)
     held = not finite.all()

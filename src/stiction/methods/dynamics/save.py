@@ -69,7 +69,11 @@ _CHECKPOINT, _SUMMARY, _FRAME_FILES = "checkpoint.npz", "summary.nc", "frames-*.
 
 
 def over(*dims: str, **meanings: tuple[str, str]) -> dict[str, Variable]:
-    """Return variables over dimensions, by name, from (units, meaning)."""
+    """Return variables over dimensions, by name, from (units, meaning).
+
+    >>> over("time", "x", load=("Pa", "load factor"))
+    {'load': Variable(units='Pa', long_name='load factor', dims=('time', 'x'))}
+    """
     return {name: Variable(*meaning, dims) for name, meaning in meanings.items()}
 
 
@@ -174,6 +178,21 @@ class Save(Listed):
 
         Warn about positions that are nearly zero, and about stations at
         nodes that cannot break.
+
+        The end of a period is the first node. Places that are nearly zero, or
+        beyond an extent, are doubted.
+
+        >>> from stiction.base.errors import collect_warnings
+        >>> line, plane = Interface(0.8, 8), Interface((0.8, 0.4), (8, 8))
+        >>> Save(["slip"], stations={"a": 0.34, "b": 0.79, "c": 0.0}).nodes(line).tolist()
+        [3, 0, 0]
+        >>> Save(["slip"], stations={"a": (0.34, 0.12)}).nodes(plane).tolist()  # 3 * 8 + 2
+        [26]
+        >>> with collect_warnings() as warned:
+        ...     nodes = Save(["slip"], stations={"a": 0.049, "b": 0.051}).nodes(line)
+        ...     _ = Save(["slip"], stations={"c": 0.6}).nodes(Interface(0.8, 8, extent=(0.1, 0.5)))
+        >>> nodes.tolist(), [str(warning)[:32] for warning in warned]
+        ([0, 1], ["stations['a']: (0.049,) is neare", "stations['c']: (0.6,) lies beyon"])
         """
         lengths, numbers = interface.lengths, []
         for name, place in self.stations.items():
@@ -229,7 +248,38 @@ class Recorder:
         return taken, reason
 
     def add(self, state: RuptureState) -> None:
-        """Keep a frame of the present state."""
+        """Keep a frame of the present state.
+
+        >>> from types import FunctionType, SimpleNamespace
+        >>> names = globals() | {"energy_balance": lambda run, state: {"strain_energy": 9.0}}
+        >>> plain = FunctionType(Recorder.add.__code__, names)
+        >>> medium = SimpleNamespace(interface=Interface(0.8, 8))
+        >>> solid = SimpleNamespace(shear_modulus=3.0)
+        >>> medium.problem = SimpleNamespace(solid=solid, interface=medium.interface)
+        >>> run = SimpleNamespace(medium=medium)
+        >>> run.setting = SimpleNamespace(thresholds=SimpleNamespace(breakable=4))
+        >>> run.mean, run.strength_after = np.mean, lambda slip: 5.0 - slip
+        >>> step = {"time": 1.0, "load": 2.0, "mean_stress": 3.0, "work": 4.0, "weakened_nodes": 3}
+        >>> slip, stress = np.full(8, 0.5), np.arange(8.0)
+        >>> state = SimpleNamespace(now={"step": step}, slip=slip, stress=stress)
+        >>> state.slip_rate = 0.1 * stress
+        >>> recorder = SimpleNamespace(run=run, save=Save(["shear_stress", "strength"]), _frames=[])
+        >>> plain(recorder, state)
+        >>> stress += 9.0  # a frame keeps its values
+        >>> for name, value in recorder._frames[0].items():
+        ...     print(name, np.round(value, 9).tolist())
+        time 1.0
+        load 2.0
+        mean_stress 3.0
+        work 4.0
+        mean_slip 0.5
+        top_slip_rate 0.7
+        weakened_fraction 0.75
+        seismic_moment 1.2
+        strain_energy 9.0
+        shear_stress [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
+        strength [4.5, 4.5, 4.5, 4.5, 4.5, 4.5, 4.5, 4.5]
+        """
         run, step, medium = self.run, state.now["step"], self.run.medium
         frame: dict[str, Any] = {name: float(step[name]) for name in _OF_STEP}
         frame |= {
@@ -283,6 +333,35 @@ class Recorder:
 
         If the folder holds a part of the same run, the state takes the
         values that were written last.
+
+        A new folder gets a checkpoint. A folder with frames after its checkpoint
+        loses them, and a folder with other files is refused.
+
+        >>> import tempfile
+        >>> from types import FunctionType, SimpleNamespace
+        >>> names = globals() | {"write_checkpoint": lambda path, *given: path.write_text("")}
+        >>> names["read_checkpoint"] = lambda *given: None
+        >>> plain, folder = FunctionType(Recorder.begin.__code__, names), Path(tempfile.mkdtemp())
+        >>> recorder = SimpleNamespace(save=SimpleNamespace(to=folder), run=None, _saved="")
+        >>> state = SimpleNamespace(steps=7)
+        >>> _ = (folder / f"killed{PART}").write_text("")
+        >>> plain(recorder, state), {path.suffix for path in folder.iterdir()} == {".npz", PART}
+        (False, True)
+        >>> for name in ("frames-000000000007.nc", "frames-000000000008.nc"):
+        ...     _ = (folder / name).write_text("")
+        >>> plain(recorder, state), [path.name for path in folder.glob("*.nc")]
+        (False, ['frames-000000000007.nc'])
+        >>> _ = (folder / "summary.nc").write_text("")
+        >>> plain(recorder, state)
+        True
+        >>> (folder / "checkpoint.npz").unlink()
+        >>> plain(recorder, state)  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+            ...
+        stiction.base.errors.InputError: to: ... is not empty and holds no rupture...
+        >>> recorder.save.to = None
+        >>> plain(recorder, state)
+        False
         """
         folder = self.save.to
         if folder is None:
@@ -315,6 +394,28 @@ class Recorder:
         With `last` there is no checkpoint: a run that
         resumes with more steps may have no frame at
         the step at which `max_steps` ended it.
+
+        A file follows 64 frames or 50 000 steps, or a single frame at once. At the
+        end there is no checkpoint.
+
+        >>> from types import FunctionType, SimpleNamespace
+        >>> def written(frames, steps, **options):
+        ...     names = globals() | {"_write": lambda path, data: done.append(path.name)}
+        ...     names["write_checkpoint"] = lambda path, *given: done.append(path.name)
+        ...     plain = FunctionType(Recorder.flush.__code__, names, None, None, None)
+        ...     plain.__kwdefaults__ = Recorder.flush.__kwdefaults__
+        ...     recorder = SimpleNamespace(save=SimpleNamespace(to=Path("folder")))
+        ...     recorder.run, recorder._saved = None, ""
+        ...     recorder._frames, recorder.take = [{}] * frames, lambda: None
+        ...     recorder._steps, done = [{"step_time": np.zeros(steps)}] * 2, []
+        ...     plain(recorder, SimpleNamespace(steps=7), **options)
+        ...     return done
+        >>> written(64, 1), written(63, 24_999)
+        (['frames-000000000007.nc', 'checkpoint.npz'], [])
+        >>> written(1, 25_000), written(1, 1, at_once=True)
+        (['frames-000000000007.nc', 'checkpoint.npz'], ['frames-000000000007.nc', 'checkpoint.npz'])
+        >>> written(1, 1, last=True), written(0, 1, last=True)
+        (['frames-000000000007.nc'], [])
         """
         folder, steps = self.save.to, sum(rows["step_time"].size for rows in self._steps)
         # A file for every frame would be slow, and a single file would

@@ -78,6 +78,35 @@ def write_scec(
     >>> files = st.external.write_scec(run, folder, **options)
     >>> files[-1].name
     'cplot.txt'
+
+    A run by hand: the onset is at 1.5 s, before both steps and after the first
+    frame. The station lies 100 m from the origin.
+
+    >>> import xarray as xr
+    >>> fields = {name: (("time", "x"), np.zeros((2, 3))) for name in STATION_UNITS}
+    >>> values = {"slip": [1.0, 2.0], "slip_rate": [3.0, 4.0], "shear_stress": [5e6, 6e6]}
+    >>> fields |= {f"station_{n}": (("step", "station"), np.c_[v]) for n, v in values.items()}
+    >>> fields |= {"arrival_time": ("x", [np.nan, 2.0, 3.5]), "onset_time": 1.5}
+    >>> places = {"x": [0.0, 100.0, 200.0], "station": ["a"], "station_x": ("station", [100.0])}
+    >>> run = xr.Dataset(fields, places | {"time": [1.0, 1.8], "step_time": ("step", [1.6, 2.0])})
+    >>> options = {"origin": 0.0, "normal_stress": -5e6, "benchmark": "own"}
+    >>> record, plot = write_scec(run, folder, **options)
+    >>> for line in (record.name, *record.read_text().splitlines()[:5]):
+    ...     print(line)
+    faultst001dp000.txt
+    # problem=own
+    # code=stiction
+    # element_size=100 m
+    # num_time_steps=2
+    # location=100 m along strike, 0 m down-dip
+    >>> np.loadtxt(record, comments=("#", "t")).round(9).tolist()
+    [[0.1, 1.0, 3.0, 5.0, 0.0, 0.0, 0.0, -5.0], [0.5, 2.0, 4.0, 6.0, 0.0, 0.0, 0.0, -5.0]]
+    >>> np.loadtxt(plot, comments=("#", "j")).tolist()
+    [[0.0, 0.0, 1000000000.0], [100.0, 0.0, 0.5], [200.0, 0.0, 2.0]]
+    >>> run = run.drop_vars("onset_time")  # then times count from the first frame
+    >>> record, _ = write_scec(run, folder, **options)
+    >>> np.loadtxt(record, comments=("#", "t"))[:, :2].round(9).tolist()
+    [[0.0, 0.0], [0.6, 1.0], [1.0, 2.0]]
     """
     needed = [*STATION_UNITS, *(f"station_{name}" for name in STATION_UNITS)]
     if lacking := [name for name in needed if name not in getattr(run, "data_vars", ())]:

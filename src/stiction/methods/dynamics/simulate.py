@@ -158,7 +158,33 @@ def simulate_rupture(
 def _record_to_end(
     run: Run, state: RuptureState, recorder: Recorder, max_steps: int, meter: Meter
 ) -> str:
-    """Take steps and keep frames until the run ends. Return the reason."""
+    """Take steps and keep frames until the run ends. Return the reason.
+
+    Explicit steps come in groups of 20, and implicit steps in groups of 2. If
+    `max_steps` is near, all is written at once.
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.methods.dynamics.state import Reason
+    >>> def recorded(max_steps, ending=None, reason=Reason.DONE):
+    ...     def take_steps(state, count):
+    ...         calls.append(count)
+    ...         state.steps, state.explicit = state.steps + count, True
+    ...         return count, reason
+    ...     calls, meter = [], SimpleNamespace(advance=lambda taken: None)
+    ...     step = {"time": 1.0, "mean_stress": 2e6, "weakened_nodes": 3, "load": 5.0}
+    ...     state = SimpleNamespace(steps=0, explicit=False, now={"step": step})
+    ...     recorder = SimpleNamespace(save=SimpleNamespace(every=20), take_steps=take_steps)
+    ...     words = {True: "now", False: "flush"}
+    ...     recorder.flush = lambda state, at_once=False: calls.append(words[at_once])
+    ...     recorder.add = lambda state: calls.append("add")
+    ...     run = SimpleNamespace(ending=lambda state, reason: ending if state.steps > 20 else None)
+    ...     run.setting = SimpleNamespace(thresholds=SimpleNamespace(breakable=4))
+    ...     return _record_to_end(run, state, recorder, max_steps, meter), calls, meter.note
+    >>> recorded(23)[:2]
+    ('max_steps', [2, 'add', 'flush', 20, 'add', 'flush', 'now', 1, 'add', 'flush'])
+    >>> recorded(99, ending="sliding")
+    ('sliding', [2, 'add', 'flush', 20, 'add'], 't = 1 s, mean stress 2.0000 MPa, 75% weakened')
+    """
     interval = recorder.save.every
     while state.steps < max_steps:
         # An implicit step is much longer than an explicit step.
@@ -185,7 +211,28 @@ def _record_to_end(
 
 
 def _spectrum(dataset: xr.Dataset, run: Run, state: RuptureState) -> tuple[Any, Any]:
-    """Return the spectrum of the highest instability, up to the next instability or the end."""
+    """Return the spectrum of the highest instability, up to the next instability or the end.
+
+    The highest instability is at 2 s, and the next event at 4 s. Events before
+    it do not count.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> def given(problem, time, rate):
+    ...     return time.tolist(), rate.tolist()
+    >>> plain = FunctionType(_spectrum.__code__, globals() | {"rate_spectrum": given})
+    >>> data = {"step_time": np.arange(1.0, 7.0), "moment_rate": 10.0 * np.arange(6)}
+    >>> data = {name: SimpleNamespace(values=values) for name, values in data.items()}
+    >>> run = SimpleNamespace(medium=SimpleNamespace(problem=None))
+    >>> run.events = [{"time": 1.0}, {"time": 2.0}, {"time": 5.0}, {"time": 4.0}]
+    >>> results = {"onset_time": 2.0, "instabilities": 4}
+    >>> plain(data, run, SimpleNamespace(now={"results": results}))
+    ([2.0, 3.0, 4.0], [10.0, 20.0, 30.0])
+    >>> run.events = run.events[:2]
+    >>> plain(data, run, SimpleNamespace(now={"results": results}))[0]
+    [2.0, 3.0, 4.0, 5.0, 6.0]
+    >>> plain(data, run, SimpleNamespace(now={"results": results | {"instabilities": 0}}))[0]
+    []
+    """
     moment_rate = dataset["moment_rate"].values
     time, onset = dataset["step_time"].values, float(state.now["results"]["onset_time"])
     later = [float(event["time"]) for event in run.events if event["time"] > onset]

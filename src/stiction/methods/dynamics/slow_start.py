@@ -55,14 +55,41 @@ _MAX_TRIALS = 5
 
 
 def static_search(problem: Problem) -> DenseSearch | None:
-    """Return the search for equilibria of a problem, or `None` for planes and curved laws."""
+    """Return the search for equilibria of a problem, or `None` for planes and curved laws.
+
+    >>> import dataclasses, stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> type(static_search(problem)).__name__
+    'DenseSearch'
+    >>> law = st.ExponentialWeakening(weakening_rate=5e11)
+    >>> static_search(dataclasses.replace(problem, friction=law)) is None
+    True
+    """
     if problem.interface.is_plane or refused(problem):
         return None
     return DenseSearch(problem)
 
 
 def first_instability(search: DenseSearch, rows: Sample, number: int) -> float:
-    """Return the mean stress of the first instability in equilibrium, Pa, or NaN without it."""
+    """Return the mean stress of the first instability in equilibrium, Pa, or NaN without it.
+
+    The mean stress is the load less the relief by slip, here 7 - 0.5 * 4 Pa.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> names = globals() | {"sample_of": lambda rows, pieces, number: number}
+    >>> plain = FunctionType(first_instability.__code__, names)
+    >>> state = SimpleNamespace(status=PathStatus.UNSTABLE, load=7.0, slip=np.full(2, 2.0))
+    >>> search = SimpleNamespace(next=lambda sample: state, pieces=None)
+    >>> search.problem = SimpleNamespace(relief=lambda slip: 0.5 * slip.sum())
+    >>> rows = SimpleNamespace(strength=np.array([[9.0, 9.0], [9.0, 3.0]]))
+    >>> rows.initial_stress = np.full((2, 2), 3.0)
+    >>> rows.part = lambda some: SimpleNamespace(mean_stress=lambda load: load + some.stop)
+    >>> plain(search, rows, 0), plain(search, rows, 1)  # node 1 has no strength to spare
+    (6.0, nan)
+    >>> state.status = PathStatus.STABLE
+    >>> plain(search, rows, 0)
+    nan
+    """
     if np.any(rows.strength[number] <= rows.initial_stress[number]):  # overstressed
         return np.nan
     state = search.next(sample_of(rows, search.pieces, number))
@@ -76,6 +103,37 @@ def slow_start(search: DenseSearch, run: Run, rows: Sample, number: int) -> Rupt
     """Return the state with a small error that is closest to the onset, or `None`.
 
     `number` is the row of the sample. The loading rate is constant.
+
+    Shear waves cross h_n in 0.1 s, so the first distance is 10 * 0.1 * 2 Pa. An
+    unknown state makes it four times as large, and an error of twice the
+    allowed error 1.2 * 2^0.4 times.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> def distances(errors, first_load=0.0, peak=9.0, onset=100.0):
+    ...     def state_at(search, run, static, load, distance):
+    ...         tried.append(round(distance, 6))
+    ...         error = errors[len(tried) - 1]
+    ...         start = {"run": {"start_error": error and error * 2e-5 * 50.0}}
+    ...         return None if error is None else SimpleNamespace(now=start)
+    ...     tried, names = [], {"_state_at": state_at, "sample_of": lambda *given: None}
+    ...     plain = FunctionType(slow_start.__code__, globals() | names)
+    ...     problem = SimpleNamespace(nucleation_lengths=lambda rate: (1.5 / rate, 9.0))
+    ...     problem.solid = SimpleNamespace(shear_wave_speed=5.0)
+    ...     equilibrium = onset and SimpleNamespace(load=onset)
+    ...     search = SimpleNamespace(solve=lambda static: equilibrium, problem=problem, pieces=None)
+    ...     nodes = SimpleNamespace(peak=np.array([peak, 8.0]), initial=np.array([3.0, 3.0]))
+    ...     run = SimpleNamespace(setting=SimpleNamespace(nodes=nodes), slope=lambda time: 2.0)
+    ...     run.scale_at, run.first_load = lambda load: 0.5 * load, first_load
+    ...     run.steepest_weakening_rate = 3.0
+    ...     return plain(search, run, None, 0) is not None, tried
+    >>> distances([None, 2.0, 1.0])
+    (True, [2.0, 8.0, 12.667276])
+    >>> distances([None] * 5), distances([1.1] * 5)[0]
+    ((False, [2.0, 8.0, 32.0]), False)
+    >>> distances([1.0], first_load=97.5), distances([1.0], first_load=97.4)
+    ((False, []), (True, [2.0]))
+    >>> distances([1.0], peak=3.0), distances([1.0], peak=np.inf), distances([1.0], onset=None)
+    ((False, []), (False, []), (False, []))
     """
     nodes, loading_rate = run.setting.nodes, run.slope(0.0)
     if not np.all(np.isfinite(nodes.peak)) or np.any(nodes.peak <= nodes.initial):

@@ -70,7 +70,22 @@ return."""
 
 
 def refusals(method: Any, problem: Problem) -> list[str]:
-    """Return the reasons why a rupture cannot run on the specimen of a problem."""
+    """Return the reasons why a rupture cannot run on the specimen of a problem.
+
+    >>> from types import SimpleNamespace
+    >>> import stiction as st
+    >>> problem = SimpleNamespace(friction=st.LinearWeakening(4.0), specimen=None)
+    >>> refusals(st.Rupture(courant=0.5, arrival=0.1, max_steps=9, events=2), problem)
+    []
+    >>> [reason[:28] for reason in refusals(st.Rupture(loading_rate=1e6, start="rest"), problem)]
+    ['loading_rate: has no effect ', 'start: has no effect on a sp']
+    >>> problem.friction = st.ExponentialWeakening(4.0)
+    >>> [reason[:30] for reason in refusals(st.Rupture(), problem)]
+    ['friction: ExponentialWeakening']
+    >>> problem.specimen = Slider.__new__(Slider)
+    >>> [reason[:44] for reason in refusals(st.Rupture(loading_rate=1e6), problem)]
+    ['problem.specimen: waves run through two equa']
+    """
     if isinstance(problem.specimen, Slider):
         return [
             "problem.specimen: waves run through two equal blocks only, whose pressure does not"
@@ -87,7 +102,18 @@ def refusals(method: Any, problem: Problem) -> list[str]:
 
 
 def variables(method: Any, problem: Problem) -> dict[str, Variable]:
-    """Return the variables of the results on a specimen."""
+    """Return the variables of the results on a specimen.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> from stiction.problem.interface import Interface
+    >>> solver = SimpleNamespace(variables=lambda problem: {"critical_load": None})
+    >>> plain = FunctionType(variables.__code__, globals() | {"Equilibrium": lambda: solver})
+    >>> problem = SimpleNamespace(interface=Interface(0.8, 8, ends="free"))
+    >>> [*plain(SimpleNamespace(events=0), problem)]
+    ['critical_load', 'rupture_speed', 'median_rupture_speed']
+    >>> plain(SimpleNamespace(events=2), problem)["event_duration"].dims
+    ('sample', 'event')
+    """
     known = Equilibrium().variables(problem) | SPEEDS
     if method.events:
         known |= of_samples(event_variables(problem.interface, inertia=True))
@@ -129,6 +155,17 @@ class DynamicEvent:
         With `ends`, stop earlier if all nodes have slipped.
 
         Return whether a node has not slipped yet.
+
+        >>> from types import FunctionType, SimpleNamespace
+        >>> names = globals() | {"wave_steps": lambda *given: given[5] - 2 * given[6]}
+        >>> plain = FunctionType(DynamicEvent.take_steps.__code__, names)
+        >>> waves = SimpleNamespace(slip=np.array([0.5, 0.0]))
+        >>> event = DynamicEvent(None, None, None, None, waves, None, steps=10)
+        >>> plain(event, 5, True), event.steps, event.slides  # a node has not slipped yet
+        (True, 13, False)
+        >>> waves.slip[1] = 0.1
+        >>> plain(event, 5, False), event.steps, event.slides
+        (False, 18, True)
         """
         sample, waves = self.sample, self.waves
         self.steps += wave_steps(sample, self.start, self.front, self.mesh, waves, count, ends)
@@ -136,7 +173,28 @@ class DynamicEvent:
         return not self.slides
 
     def run(self, max_steps: int) -> None:
-        """Step 2: take steps until all is at rest or all nodes have slipped."""
+        """Step 2: take steps until all is at rest or all nodes have slipped.
+
+        There is a check after every second step out of a window of 16. The slip of
+        the event is 2 m, and in the last nine checks it grows by 0.1 mm.
+
+        >>> from types import SimpleNamespace
+        >>> class Scripted(DynamicEvent):
+        ...     def take_steps(self, count, ends=True):
+        ...         self.steps += count
+        ...         self.waves.slip[0] = 3.0 if self.steps < 10 else 3.0001
+        ...         return self.steps < 100
+        >>> before = SimpleNamespace(slip=np.array([1.0, 1.0]))
+        >>> waves = SimpleNamespace(slip=np.array([1.0, 1.0]))
+        >>> event = Scripted(None, SimpleNamespace(window=15), before, None, waves, None)
+        >>> event.run(1000), event.steps
+        (None, 18)
+        >>> waves.slip[:], event.steps = 1.0, 0
+        >>> event.run(13)  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+            ...
+        stiction.base.errors.InputError: max_steps: an event has not come to rest after 14 steps...
+        """
         # Slip at the last checks, which together span a window.
         slips = deque([self.waves.slip.copy()], maxlen=CHECKS_PER_WINDOW + 1)
         while self.take_steps(-(-self.mesh.window // CHECKS_PER_WINDOW)):
@@ -159,6 +217,29 @@ def begin(
 
     `arrival` is the slip, over d_c,
     at which a front counts as arrived.
+
+    The drops are 4 and 5 Pa, so the load rises by 1e-5 * 4.5/2 Pa. Node 1 grows
+    fastest, by 1e-3 * 4 m. At node 0 this growth passes half of d_c, and must not
+    count as an arrival.
+
+    >>> from types import SimpleNamespace
+    >>> excess, residual = np.array([5.0, 7.0, np.inf]), np.array([1.0, 2.0, 0.0])
+    >>> sample = SimpleNamespace(excess=excess, residual=residual)
+    >>> sample.profile, sample.critical = np.array([1.0, 3.0, 2.0]), np.array([2.0, 4.0, np.inf])
+    >>> before = SimpleNamespace(load=10.0, slip=np.array([0.999, 2.5, 0.0]))
+    >>> before.direction, mesh = np.array([0.25, 0.5, 0.0]), SimpleNamespace(heights=np.zeros(2))
+    >>> stiffness = np.array([[2.0, -1.0, 0.0], [-1.0, 3.0, 0.0], [0.0, -2.0, 2.0]])
+    >>> mesh.impedance = 2.0
+    >>> event = begin(sample, mesh, stiffness, before, 0.5)
+    >>> event.waves.slip.round(9).tolist(), event.front.round(9).tolist()
+    ([1.001, 2.504, 0.0], [1.001, 2.0, inf])
+    >>> bool(event.front[0] > event.waves.slip[0])
+    True
+    >>> stress = (10.0 + 2.25e-5) * sample.profile - [-0.502, 6.511, -5.008]
+    >>> np.allclose(event.start, stress, rtol=1e-9)
+    True
+    >>> round(float(event.waves.now["fast_slip_rate"]), 9)  # 0.075 * 4.5/2
+    0.16875
     """
     can_break = np.isfinite(sample.excess)
     fall = (sample.excess - sample.residual)[can_break]
@@ -205,7 +286,32 @@ class RuptureSearch(DenseSearch):
     def jump(
         self, sample: StaticSample, unstable: EquilibriumState, to_rest: bool = False
     ) -> Jump:
-        """Let an unstable state run until it rests or the interface slides (steps 1 to 3)."""
+        """Let an unstable state run until it rests or the interface slides (steps 1 to 3).
+
+        The waves are scripted. Slip that is still under way comes to rest, with a
+        given outcome.
+
+        >>> from types import FunctionType, SimpleNamespace
+        >>> names = globals() | {"jump": lambda state, load, *others: Outcome.ARRESTED}
+        >>> names["SlipState"] = lambda *given: None
+        >>> plain = FunctionType(RuptureSearch.jump.__code__, names)
+        >>> now = {"fast": 1, "fast_since": 2.0, "fast_until": 5.0}
+        >>> waves = SimpleNamespace(slip=np.array([1.0, 2.0]), now=now)
+        >>> waves.arrival = np.array([0.5, 0.75])
+        >>> event = SimpleNamespace(waves=waves, slides=True, run=lambda max_steps: None)
+        >>> search = SimpleNamespace(event=lambda *given: event, max_steps=9, ends=True)
+        >>> search._workspaces = 1, 2
+        >>> search.problem = SimpleNamespace(blocks=SimpleNamespace(stiffness=np.diag([3.0, 4.0])))
+        >>> unstable = SimpleNamespace(load=7.0, direction=np.array([0.0, 1.0]))
+        >>> search.may_stop = True
+        >>> result = plain(search, None, unstable, False)
+        >>> result.outcome.name, result.state.Kd.tolist(), result.known, result.state.status.name
+        ('SLIDING', [3.0, 8.0], {'event_duration': 3.0}, 'STABLE')
+        >>> event.slides, now["fast"] = False, 0
+        >>> result = plain(search, None, unstable, False)
+        >>> result.outcome.name, result.known, result.arrival.tolist(), result.state.stopped
+        ('ARRESTED', {'event_duration': nan}, [0.5, 0.75], True)
+        """
         event = self.event(sample, unstable)
         event.run(self.max_steps)
         slip = event.waves.slip
@@ -253,6 +359,16 @@ class RuptureSolver(OnsetSolver):
 
 
 def refuse_overstress(rows: Sample) -> None:
-    """Raise an `InputError` for stress above the strength, which only half-spaces accept."""
+    """Raise an `InputError` for stress above the strength, which only half-spaces accept.
+
+    >>> from types import SimpleNamespace
+    >>> rows = SimpleNamespace(strength=np.array([5.0, 4.0]), initial_stress=np.array([5.0, 3.0]))
+    >>> refuse_overstress(rows)
+    >>> rows.initial_stress[1] = 4.1
+    >>> refuse_overstress(rows)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: initial_stress: must not be above the strength of a specimen
+    """
     if np.any(rows.strength < rows.initial_stress):
         raise InputError("initial_stress: must not be above the strength of a specimen")
