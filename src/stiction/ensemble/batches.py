@@ -135,15 +135,15 @@ def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int
 
     Each warning is issued once, at the line of the caller.
 
-    >>> from stiction.base.errors import warn_accuracy
+    >>> from stiction.base.errors import warn_of_samples
     >>> def square(number):
-    ...     warn_accuracy("a doubt")
+    ...     warn_of_samples("a doubt of {samples}", np.array([True]))
     ...     return number * number
     >>> with collect_warnings() as warned:
     ...     print(in_threads(square, [3, 1, 2], workers=2))
     [9, 1, 4]
-    >>> [warning.text for warning in warned]
-    ['a doubt']
+    >>> [str(warning) for warning in warned]  # numbers of samples are valid in a job only
+    ['a doubt of 3 of 3 samples']
     """
     with merge_warnings() as caught, ThreadPoolExecutor(workers) as pool:
         contexts = [copy_context() for _ in jobs]
@@ -157,20 +157,22 @@ def on_executor(
 ) -> list[dict[str, NDArray[Any]]]:
     """Return the columns of all tables from an executor. Each warning is issued once.
 
-    >>> from stiction.base.progress import SILENT
+    >>> from types import SimpleNamespace as Named
+    >>> counts = []
+    >>> meter = Named(advance=counts.append)
     >>> warning = Warned("a doubt of {samples}", UserWarning, 2, 1, (7,))
     >>> def square(job):
     ...     return Table({"square": np.array(job) ** 2}, (), 0.0, versions(), (warning,))
     >>> with ThreadPoolExecutor(2) as executor, collect_warnings() as warned:
-    ...     columns = on_executor(square, [[3, 5], [4]], executor, SILENT)
-    >>> [column["square"].tolist() for column in columns]
-    [[9, 25], [16]]
+    ...     columns = on_executor(square, [[3, 5], [4]], executor, meter)
+    >>> counts, [column["square"].tolist() for column in columns]
+    ([2, 1], [[9, 25], [16]])
     >>> [(warning.affected, warning.total, warning.numbers) for warning in warned]
     [(2, 4, ())]
     >>> def fails(job):
     ...     raise ValueError("no root")
     >>> with ThreadPoolExecutor(1) as executor:
-    ...     on_executor(fails, [[3, 5], [4]], executor, SILENT)  # doctest: +ELLIPSIS
+    ...     on_executor(fails, [[3, 5], [4]], executor, meter)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
     stiction.base.errors.WorkerError: the worker that computed items 0 to 1 of point 0 was lost ...
@@ -198,12 +200,12 @@ def versions() -> str:
 def solve_span(experiment: Experiment, span: Span) -> Table:
     """Solve a span of samples. A sample that fails does not stop the others.
 
-    The batch of the samples 4 to 6 fails, so each of its samples is solved
+    The batches 2 to 3 and 4 to 6 fail, so each of their samples is solved
     alone.
 
     >>> from types import SimpleNamespace as Named
     >>> def results(first, count):
-    ...     if first <= 4 < first + count:
+    ...     if first <= 3 < first + count:
     ...         raise ArithmeticError("diverged")
     ...     if first <= 6 < first + count:
     ...         raise InputError("strength: must be positive")
@@ -213,11 +215,11 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
     >>> experiment = Named(batches=batches, results=results, seed=9)
     >>> table = solve_span(experiment, Span(3, 2, 5))
     >>> [(name, values.tolist()) for name, values in table.columns.items()]
-    [('_point', [3, 3, 3]), ('_sample', [2, 3, 5]), ('stress', [20.0, 30.0, 50.0])]
+    [('_point', [3, 3, 3]), ('_sample', [2, 4, 5]), ('stress', [20.0, 40.0, 50.0])]
     >>> [tuple(failure) for failure in table.failures]
-    [(3, 4, 9, 'ArithmeticError: diverged', False), (3, 6, 9, 'strength: must be positive', True)]
+    [(3, 3, 9, 'ArithmeticError: diverged', False), (3, 6, 9, 'strength: must be positive', True)]
     >>> table = solve_span(
-    ...     Named(batches=lambda *span: [span], results=results, seed=9), Span(3, 4, 1)
+    ...     Named(batches=lambda *span: [span], results=results, seed=9), Span(3, 3, 1)
     ... )
     >>> [(name, values.tolist()) for name, values in table.columns.items()]
     [('_point', []), ('_sample', [])]
