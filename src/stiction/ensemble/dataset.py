@@ -66,7 +66,7 @@ class Gathered:
 
     Examples
     --------
-    Two points have the samples 0 to 2. One sample fails, and sample 5 does
+    Two points have the samples 0 to 2. Two samples fail, and sample 3 does
     not belong to this call.
 
     >>> from types import SimpleNamespace as Named
@@ -86,14 +86,14 @@ class Gathered:
     >>> rows = Gathered([point, point], 3)
     >>> columns = {
     ...     POINT: np.array([1, 0, 1]),
-    ...     NUMBER: np.array([2, 0, 5]),
+    ...     NUMBER: np.array([2, 0, 3]),
     ...     "critical_stress": np.array([7.0, 4.0, 9.0]),
     ...     "events": np.array([3, 1, 2]),
     ... }
     >>> failures = (
     ...     Failure(1, 1, 9, "no root"),
     ...     Failure(0, 1, 9, "late"),
-    ...     Failure(1, 6, 9, "far"),
+    ...     Failure(1, 3, 9, "far"),
     ... )
     >>> rows.add(Table(columns, failures, 0.0, ""))
     >>> rows.done.astype(int).tolist(), rows.onsets.tolist()
@@ -134,6 +134,17 @@ class Gathered:
     ...     "cut_short" in found.attrs,
     ... )
     ([1], 'i', ['events'], False)
+
+    A sample that failed is not cut short:
+
+    >>> rows = Gathered([point], 2, only=["events"])
+    >>> rows.add(
+    ...     Table(
+    ...         {name: values[1:2] for name, values in columns.items()}, failures[1:2], 0.0, ""
+    ...     )
+    ... )
+    >>> "failed_samples" in rows.dataset({}).attrs, "cut_short" in rows.dataset({}).attrs
+    (True, False)
     """
 
     def __init__(
