@@ -123,7 +123,9 @@ class Agreement(Result):
         return (text,) if p < DOUBTFUL_P_VALUE else ()
 
     def _summary(self) -> Summary:
-        """>>> peaks = Peaks((None,), (np.ones(3),), "Pa")
+        """Return the summary, with a row for each p-value.
+
+        >>> peaks = Peaks((None,), (np.ones(3),), "Pa")
         >>> print(Agreement(peaks, 1.0, 2.0, {"size": 0.25, "number": 0.5}, (), 3.0))
         3 peaks against the prediction
                            value
@@ -314,7 +316,9 @@ def summary_of(force: Array, threshold: float) -> tuple[float, float, float]:
 
 
 def _predicted_peaks(prediction: xr.Dataset, measured: Peaks) -> Array:
-    """>>> from types import SimpleNamespace
+    """Return the predicted peaks, without samples that have no peak.
+
+    >>> from types import SimpleNamespace
     >>> from stiction.base.errors import collect_warnings
     >>> measured = SimpleNamespace(variable="critical_force", values=(np.ones(3),))
     >>> peaks = ("sample", [2, np.nan, 3])

@@ -86,7 +86,9 @@ class NotRepeated(InputError):
     """Error for a family that cannot be fitted to most records simulated from the family itself."""
 
     def __init__(self, family: Family, fits: int, count: int) -> None:
-        """>>> error = NotRepeated(Family("beta", {"high": 3.0}), 4, 25)
+        """State the reason, and how many of the records were fitted.
+
+        >>> error = NotRepeated(Family("beta", {"high": 3.0}), 4, 25)
         >>> error.reason, error.family.name  # doctest: +ELLIPSIS
         ("marginal: 'beta, high 3' could be fitted to only 4 of 25 records ...", 'beta')
         >>> str(error).removeprefix(error.reason)

@@ -168,7 +168,9 @@ class Curve(Result):
     peak_error: float = 0.0
 
     def _row(self, name: str) -> Row:
-        """>>> at, none = np.zeros(0), Drops(*np.zeros((3, 0)))
+        """Return a row with the peak and, as its remark, all other results.
+
+        >>> at, none = np.zeros(0), Drops(*np.zeros((3, 0)))
         >>> two = Drops(*np.array([[1, 2], [7, 8], [0.5, 3]]))
         >>> curve = Curve("a", at, at, "N", "s", 0.03, 0.2, 9.0, 4.0, two, 6.0, peak_error=0.1)
         >>> curve._row("peak").remark
@@ -192,7 +194,7 @@ class Curve(Result):
         return Row(name, self.peak, (), self.unit, ", ".join(texts))
 
     def _summary(self) -> Summary:
-        """The title is the name of the test.
+        """Return the summary, whose title is the name of the test.
 
         >>> at, drops = np.zeros(0), Drops(*np.zeros((3, 0)))
         >>> print(Curve("a", at, at, "N", "m", 0.0, 0.0, 0.4, 2e-3, drops, 0.3))
@@ -243,7 +245,9 @@ class Curves(Sequence[Curve], Result):
 
     def _summary(self) -> Summary:
         # Files with the same columns are shown once.
-        """Readings that differ only in their source or number of values are shown once.
+        """Return the summary of all tests.
+
+        Readings that differ only in their source or number of values are shown once.
 
         >>> at, drops = np.zeros(0), Drops(*np.zeros((3, 0)))
         >>> curve = Curve("a", at, at, "N", "m", 0.0, 0.0, 4.0, 0.0, drops, 3.0)

@@ -104,6 +104,17 @@ INTERVAL_DRAWS = 4000
 
 
 def _families(given: Any) -> list[Family]:
+    """Return the families for names or tables.
+
+    >>> [family.label for family in _families(("gamma", {"type": "beta", "high": 3.0}))]
+    ['gamma', 'beta, high 3']
+    >>> [family.label for family in _families("beta")]
+    ['beta']
+    >>> _families([])
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: must name a family
+    """
     several = given if isinstance(given, list | tuple) else [given]
     if not several:
         raise InputError("must name a family")
@@ -111,6 +122,11 @@ def _families(given: Any) -> list[Family]:
 
 
 def _factors(given: Any) -> tuple[str, ...]:
+    """Return the families of the factor between specimens.
+
+    >>> _factors(False), _factors("normal"), _factors(True) == families_of(True)
+    ((), ('normal',), True)
+    """
     return () if given is False else families_of(given)
 
 
@@ -182,7 +198,13 @@ class FieldFit(WithFactors, Result):
 
     @property
     def specimens(self) -> int:
-        """Number of specimens whose scatter was fitted, or 0 without `between`."""
+        """Number of specimens whose scatter was fitted, or 0 without `between`.
+
+        >>> from types import SimpleNamespace
+        >>> fit = SimpleNamespace(_levels=np.ones(3), _families=("normal",))
+        >>> FieldFit.specimens.fget(fit), FieldFit.specimens.fget(SimpleNamespace(_families=()))
+        (3, 0)
+        """
         return self._levels.size if self._families else 0
 
     @property
@@ -196,7 +218,14 @@ class FieldFit(WithFactors, Result):
 
     @property
     def tied(self) -> tuple[str, ...]:
-        """Names of the families that the records cannot distinguish from the best family."""
+        """Names of the families that the records cannot distinguish from the best family.
+
+        >>> from types import SimpleNamespace
+        >>> scores = {"a": 0.0, "b": -1.9, "c": -2.0}
+        >>> families = {name: SimpleNamespace(score=score) for name, score in scores.items()}
+        >>> FieldFit.tied.fget(SimpleNamespace(families=families))
+        ('a', 'b')
+        """
         return tuple(name for name, one in self.families.items() if one.score > -TOLD)
 
     @cached_property
@@ -256,6 +285,10 @@ class FieldFit(WithFactors, Result):
 
         The result is `None` if records are of a single specimen, which
         has no posterior of mean and scatter.
+
+        >>> from types import SimpleNamespace
+        >>> FieldFit.prediction(SimpleNamespace(_families=()), None, None, {}, None) is None
+        True
         """
         if not self._families:
             return None
@@ -265,7 +298,31 @@ class FieldFit(WithFactors, Result):
         return Prediction.of(grid, with_values(problem, given, "problem"), simulation)
 
     def _chosen(self, count: int, seed: int) -> list[RandomField]:
-        """Return likely fields from all families in proportion to their weights (step 6)."""
+        """Return likely fields from all families in proportion to their weights (step 6).
+
+        Family 'a' has two fields and three quarters of the weight. Family 'b' has one field.
+        Family 'z' has no weight and no field.
+
+        >>> from types import SimpleNamespace
+        >>> weights = {"a": 0.3, "z": 0.0, "b": 0.1}
+        >>> families = {name: SimpleNamespace(weight=share) for name, share in weights.items()}
+        >>> likely = [["a0", "a1"], ["b0"]]
+        >>> fit = SimpleNamespace(quantity="strength", _likely=likely, families=families)
+        >>> chosen = FieldFit._chosen(fit, 1000, 7)
+        >>> 745 < len(chosen) - chosen.count("b0") < 755
+        True
+        >>> abs(chosen.count("a0") - chosen.count("a1")) <= 1
+        True
+        >>> chosen[:9] == FieldFit._chosen(fit, 9, 7)
+        True
+        >>> len({tuple(FieldFit._chosen(fit, 4, seed)) for seed in range(20)}) > 2
+        True
+        >>> fit.quantity = "normal_pressure"
+        >>> FieldFit._chosen(fit, 9, 7)  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+            ...
+        stiction.base.errors.InputError: interfaces: need a strength, but ...
+        """
         if self.quantity not in ("strength", "friction_coefficient"):
             raise InputError(
                 f"interfaces: need a strength, but this fit describes {self.quantity}. Pass fields"
@@ -298,7 +355,44 @@ class FieldFit(WithFactors, Result):
         return self._with_levels(list(dict.fromkeys(self._chosen(count, seed))))
 
     def _with_levels(self, fields: Sequence[RandomField]) -> Profiles:
-        """Return the fields, the record levels, and the variance of each level by each field."""
+        """Return the fields, the record levels, and the variance of each level by each field.
+
+        The second field has twice the coefficient of variation and twice the length. Its levels
+        have 8 times the variance, but at most the variance of the field.
+
+        >>> import stiction as st
+        >>> from types import SimpleNamespace
+        >>> def field(mean, cv, length):
+        ...     law = st.Lognormal(mean=mean, cv=cv)
+        ...     return RandomField(law, st.ExponentialSpectrum(length))
+        >>> truth = SimpleNamespace(
+        ...     parameters={"mean": 2.0, "standard_deviation": 0.4},
+        ...     within=np.array([0.001, 0.03]), field=lambda quantity: field(2.0, 0.2, 1e-3))
+        >>> fit = SimpleNamespace(quantity="strength", _estimate=truth)
+        >>> fit._levels, fit._families = np.array([3.0, 4.0]), ("normal",)
+        >>> fields = [field(2.0, 0.2, 1e-3), field(5.0, 0.4, 2e-3)]
+        >>> profiles = FieldFit._with_levels(fit, fields)
+        >>> profiles.within.round(6).tolist(), round(math.log1p(0.4**2), 6)
+        ([[0.001, 0.03], [0.008, 0.14842]], 0.14842)
+        >>> profiles.levels.tolist(), profiles.reference, profiles.families
+        ([3.0, 4.0], 2.0, ('normal',))
+        >>> [round(one.strength.mean, 6) for one in profiles.fields]
+        [2.0, 2.0]
+
+        Without `between`, the weighted mean is the level of a single specimen.
+
+        >>> fit._families = ()
+        >>> profiles = FieldFit._with_levels(fit, fields)
+        >>> weights = 1000.0, 1.0 / 0.03
+        >>> f"{profiles.levels[0] - (3 * weights[0] + 4 * weights[1]) / sum(weights):.6f}"
+        '0.000000'
+        >>> f"{profiles.within[0, 0] * sum(weights):.6f}", profiles.within.shape
+        ('1.000000', (2, 1))
+        >>> f"{profiles.within[1, 0] * (1 / 0.008 + 1 / math.log1p(0.4**2)):.6f}"
+        '1.000000'
+        >>> profiles.families == families_of(True)
+        True
+        """
         truth, levels = self._estimate, self._levels
         mean, deviation = (truth.parameters[k] for k in ("mean", "standard_deviation"))
         length = truth.field(self.quantity).spectrum.efolding_length
@@ -320,6 +414,38 @@ class FieldFit(WithFactors, Result):
         return Profiles(members, mean, levels, within, families)
 
     def _summary(self) -> Summary:
+        """Return the summary: parameters with intervals, scores, p-values and doubts.
+
+        >>> import stiction as st
+        >>> from types import SimpleNamespace
+        >>> best, second = SimpleNamespace(score=0.0), SimpleNamespace(score=-1.5)
+        >>> families = {"lognormal": best, "beta": second}
+        >>> field = st.RandomField(st.Lognormal(mean=2e6, cv=0.2), st.ExponentialSpectrum(1e-3))
+        >>> numbers = {"mean": 2e6, "marginal.mean": 2e6, "exponent": 3.0}
+        >>> fit = SimpleNamespace(
+        ...     field=field, lengths_held=12.34, quantity="strength", parameters=numbers,
+        ...     missing=(3, 90),
+        ...     interval={name: (value / 2.0, value * 2.0) for name, value in numbers.items()},
+        ...     p_values={"marginal": 0.25, "level": 0.5}, families=families,
+        ...     tied=("lognormal", "beta"), repetitions=(1, 2), doubts=("too short",))
+        >>> summary = FieldFit._summary(fit)
+        >>> print(summary.title, summary.interval, sep="\\n")
+        lognormal marginal, exponential spectrum from 12.3 correlation lengths
+        90 % interval
+        >>> for row in summary.rows:
+        ...     print(row.name, row.value, row.interval, row.unit)
+        marginal.mean 2000000.0 (1000000.0, 4000000.0) Pa
+        exponent 3.0 (1.5, 6.0) 1
+        >>> print(*summary.notes, sep="\\n")
+        3 of 90 points are missing and left out
+        scores of families: lognormal 0.0, beta -1.5 (lognormal, beta cannot be distinguished)
+        p-values: marginal 0.25, level 0.5 (2 repetitions)
+        ! too short
+        >>> fit.missing, fit.families, fit.doubts = (0, 90), {"lognormal": best}, ()
+        >>> fit.parameters = {"mean": 2e6}
+        >>> FieldFit._summary(fit).rows[0].name, FieldFit._summary(fit).notes
+        ('mean', ['p-values: marginal 0.25, level 0.5 (2 repetitions)'])
+        """
         marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")
         spectrum = getattr(self.field.spectrum, "type", "").replace("_", " ")
         held = f"{self.lengths_held:.3g} correlation lengths"
@@ -485,7 +611,36 @@ def fit_field(
 def _refitted(
     settings: list[FitSetting], rows: Sequence[Array], count: int, seed: int, progress: Progress
 ) -> tuple[dict[str, Goodness], list[Refits], list[Refits]]:
-    """Return the families, and repetitions of the best and of others (steps 2 and 3)."""
+    """Return the families, and repetitions of the best and of others (steps 2 and 3).
+
+    The repetitions of other families are in proportion to their weights, but at least 20. Fits
+    are replaced here, and the family 'b' cannot be repeated.
+
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import patch
+    >>> from stiction.base.errors import collect_warnings
+    >>> weights = {"b": 0.6, "a": 0.5, "c": 0.3, "d": 0.01, "e": 0.0}
+    >>> def ranked(settings, rows):
+    ...     names = [setting.marginal.label for setting in settings]
+    ...     return names, {name: SimpleNamespace(weight=weights[name]) for name in names}
+    >>> def repeated(best, count, seed, progress, further):
+    ...     if best == "b":
+    ...         raise NotRepeated(names["b"], 3, count)
+    ...     return [best, count, seed, progress], further
+    >>> names = {name: SimpleNamespace(label=name) for name in weights}
+    >>> settings = [SimpleNamespace(marginal=law) for law in names.values()]
+    >>> changed = {"ranking": ranked, "bootstrapped": repeated}
+    >>> with patch.multiple("stiction.inference.fit", **changed), collect_warnings() as caught:
+    ...     families, best, further = _refitted(settings, ["row"], 100, 7, False)
+    ...     _refitted(settings[:1], ["row"], 100, 7, False)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.inference.bootstrap.NotRepeated: marginal: 'b' could be fitted to only 3 of 100 ...
+    >>> [*families], best, further
+    (['a', 'c', 'd', 'e'], ['a', 100, 7, False], [('c', 60), ('d', 20)])
+    >>> print(*caught)  # doctest: +ELLIPSIS
+    marginal: 'b' could be fitted to only 3 of 100 ..., so this family is left out
+    """
     estimates, families = ranking(settings, rows)
     # A family that is rarely drawn needs few repetitions.
     weights = [one.weight for one in families.values() if one.weight > 0.0]
@@ -512,6 +667,64 @@ def _judged(
     """Return parameters, intervals, p-values and doubts.
 
     Each field has `count` repetitions.
+
+    Records of one field: `count` repetitions are wanted for each of the fields. (The intervals
+    are replaced here.)
+
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import patch
+    >>> import stiction as st
+    >>> def fit(distance, roughness, **more):
+    ...     return SimpleNamespace(distance=distance, roughness=roughness, **more)
+    >>> field = RandomField(st.Lognormal(mean=2.0, cv=0.2), st.ExponentialSpectrum(1e-3))
+    >>> setting = SimpleNamespace(between=False)
+    >>> truth = fit(
+    ...     1.0, math.e**2, parameters={"mean": 2.0, "marginal.mean": 2.0, "marginal.cv": 0.2},
+    ...     as_of_one=lambda rows: rows, chance_of_scatter=lambda levels: levels[1] / 8.0,
+    ...     setting=setting, within=np.array([0.01, 0.02]), field=lambda quantity: field)
+    >>> fits = [fit(math.exp(k), math.exp(k)) for k in (0, 2, 4)]
+    >>> repeated = [Refits(truth, fits), Refits(truth, fits[:1])]
+    >>> def judged(levels, count=3):
+    ...     ends, rows = {"marginal.cv": (1, 2)}, [levels[:1], levels[1:]]
+    ...     given = {"_doubts": lambda *_: ["doubt"], "intervals": lambda *_: ends}
+    ...     with patch.multiple("stiction.inference.fit", **given):
+    ...         return _judged(repeated, rows, levels, count, ("lognormal",))
+    >>> found = judged(np.array([1.0, 3.0]))
+    >>> found["doubts"], found["interval"]
+    (('doubt', 'intervals omit the 2 repetitions whose fit failed'), {'marginal.cv': (1, 2)})
+    >>> found["parameters"] == truth.parameters
+    True
+    >>> {name: round(float(p), 6) for name, p in found["p_values"].items()}
+    {'marginal': 0.761116, 'spectrum': 0.5, 'level': 0.375}
+    >>> "level" in judged(np.array([3.0]))["p_values"], judged(np.ones(2), 2)["doubts"]
+    (False, ('doubt',))
+
+    Records of specimens: the mean and the scatter follow from the posterior of the levels.
+
+    >>> setting.between = True
+    >>> found = judged(np.array([1.8, 2.3]), 2)
+    >>> "level" in found["p_values"], sorted(found["interval"])
+    (False, ['between', 'marginal.cv', 'marginal.mean', 'mean'])
+    >>> found["interval"]["mean"] == found["interval"]["marginal.mean"]
+    True
+    >>> low, high = found["interval"]["mean"]
+    >>> low < 1.8 < 2.3 < high, found["interval"]["marginal.cv"]
+    (True, (1, 2))
+    >>> low, high = found["interval"]["between"]
+    >>> 0.0 < low < found["parameters"]["between"] < high < 1.0, len(found["doubts"])
+    (True, 2)
+    >>> interfaces, within = (RandomInterface(strength=field),), truth.within[None]
+    >>> profiles = Profiles(interfaces, 2.0, np.array([1.8, 2.3]), within, ("lognormal",))
+    >>> grid = grid_of_profiles(profiles)[0]
+    >>> drawn = grid.described(grid.draws(20_000, np.random.default_rng(1)))
+    >>> for name in ("mean", "between"):
+    ...     shares = [np.mean(drawn[name] < end) for end in found["interval"][name]]
+    ...     print(np.abs(np.array(shares) - TAILS).max() < 0.04)
+    True
+    True
+    >>> below = np.mean(drawn["between"] < found["parameters"]["between"])
+    >>> bool(0.44 < below < 0.56)
+    True
     """
     fitted, fits = repeated[0]
     parameters = dict(fitted.parameters)
@@ -547,7 +760,21 @@ def _judged(
 
 
 def _p_value(name: str, truth: BestFit, fits: Sequence[BestFit]) -> float:
-    """Return the p-value of a distance of the data, given the distances of repetitions (step 5)."""
+    """Return the p-value of a distance of the data, given the distances of repetitions (step 5).
+
+    The logarithms 0, 2 and 4 of the repetitions have the standard deviation 2. Student's
+    distribution with 2 degrees of freedom has 1/2 - t/(2 (2 + t^2)^(1/2)) above t.
+
+    >>> from types import SimpleNamespace
+    >>> fits = [SimpleNamespace(distance=math.exp(k)) for k in (0, 2, 4)]
+    >>> for t in (0.0, 1.0, -1.0):
+    ...     truth = SimpleNamespace(distance=math.exp(2.0 + t * 2.0 * math.sqrt(4.0 / 3.0)))
+    ...     p = _p_value("distance", truth, fits)
+    ...     print(f"{p - 0.5 + 0.5 * t / math.sqrt(2.0 + t**2):.6f}".replace("-", ""))
+    0.000000
+    0.000000
+    0.000000
+    """
     repeats = np.log([getattr(fit, name) for fit in fits])
     # The data and the mean of the repetitions both scatter.
     error = repeats.std(ddof=1) * math.sqrt(1.0 + 1.0 / repeats.size)
@@ -556,7 +783,32 @@ def _p_value(name: str, truth: BestFit, fits: Sequence[BestFit]) -> float:
 
 
 def _doubts(fitted: BestFit, p_values: Mapping[str, float]) -> list[str]:
-    """Return the reasons not to trust a fit."""
+    """Return the reasons not to trust a fit.
+
+    >>> from types import SimpleNamespace
+    >>> def doubts(held=10.0, noise_share=0.0, ends=(), **p_values):
+    ...     model = SimpleNamespace(
+    ...         noise=math.sqrt(2.0 * noise_share), noise_share=noise_share, variance=2.0,
+    ...         signal=lambda window: np.array([9.0, 8.0, 4.0, 1.9]))
+    ...     spectrum = SimpleNamespace(at_end=lambda model: dict(ends))
+    ...     setting = SimpleNamespace(windows=(Window(), Window()), spectrum=spectrum)
+    ...     fitted = SimpleNamespace(lengths_held=held, model=model, setting=setting)
+    ...     return [text.split(",")[0].split(". ")[0] for text in _doubts(fitted, p_values)]
+    >>> class Window:
+    ...     weights = np.array([0.0, 0.5, 1.0, 1.0])
+    >>> doubts(marginal=0.02, spectrum=0.5)
+    []
+    >>> doubts(9.9), doubts(marginal=0.01, spectrum=0.5)
+    (['the records hold 9.9 correlation lengths'], ['the p-value of the marginal is 0.01'])
+    >>> doubts(ends=[("exponent", 16.0)])
+    ['exponent 16 lies at an end of the searched range']
+
+    The power at the cut-off is 2*4 times the fraction of the field, and the noise has the
+    variance 2 times its fraction.
+
+    >>> doubts(noise_share=0.75), doubts(noise_share=0.85)
+    ([], ['the noise (1.3) hides the cut-off of the spectrum'])
+    """
     doubts = []
     held, noise = fitted.lengths_held, fitted.model.noise
     if held < ENOUGH_LENGTHS:
@@ -583,7 +835,21 @@ def _doubts(fitted: BestFit, p_values: Mapping[str, float]) -> list[str]:
 
 
 def _power_at_cutoff(fitted: BestFit, window: RecordWindow) -> float:
-    """Return the power of the field, relative to white noise, where it has fallen to a quarter."""
+    """Return the power of the field, relative to white noise, where it has fallen to a quarter.
+
+    The power is 2*0.75 times the signal, without the mean. It is at least a quarter of 12 at
+    two wavenumbers, or at three.
+
+    >>> from types import SimpleNamespace
+    >>> window = SimpleNamespace(weights=np.array([0.0, 0.5, 1.0, 1.0]))
+    >>> def power(last, noise_share=0.25):
+    ...     model = SimpleNamespace(
+    ...         variance=2.0, noise_share=noise_share,
+    ...         signal=lambda window: np.array([9.0, 8.0, 4.0, last]))
+    ...     return _power_at_cutoff(SimpleNamespace(model=model), window)
+    >>> power(1.9), power(2.0), power(2.0, 0.0), power(2.0, -0.1)
+    (6.0, 3.0, inf, inf)
+    """
     model = fitted.model
     if model.noise_share <= 0.0:
         return math.inf

@@ -288,7 +288,21 @@ def _of_parameters(
 
 
 def _grown(box: Array, u: Array | None) -> Array:
-    """Return the box, widened at the ends that draws (draws, parameters) reach (step 5)."""
+    """Return the box, widened at the ends that draws (draws, parameters) reach (step 5).
+
+    A box grows by its width at the ends that more than 0.1 % of the draws reach.
+
+    >>> box = np.array([[0.4, 0.3], [0.6, 0.35]])
+    >>> u = np.full((2000, 2), [0.5, 0.32])
+    >>> u[:3] = [[0.409, 0.32], [0.409, 0.3481], [0.409, 0.3481]]
+    >>> _grown(box, u).round(6).tolist()
+    [[0.2, 0.3], [0.6, 0.35]]
+    >>> u[3] = 0.591, 0.3481
+    >>> _grown(box, u).round(6).tolist()  # 3 of 2000 draws reach the upper end
+    [[0.2, 0.3], [0.6, 0.4]]
+    >>> _grown(np.array([[0.4, 0.1], [0.6, 0.9]]), None).round(6).tolist()
+    [[0.2, 0.0], [0.8, 1.0]]
+    """
     # A box without any likelihood grows on all sides.
     width, touched = np.ptp(box, axis=0), np.ones(box.shape, dtype=np.bool_)
     if u is not None:
@@ -298,7 +312,31 @@ def _grown(box: Array, u: Array | None) -> Array:
 
 
 def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
-    """Return notes on the limitations of a posterior with draws u (draws, parameters)."""
+    """Return notes on the limitations of a posterior with draws u (draws, parameters).
+
+    A posterior in the middle of the prior, with a small error, gives no notes. More than 8 % of
+    the draws in the last 2 % of a prior do.
+
+    >>> import stiction as st
+    >>> from types import SimpleNamespace
+    >>> problem = st.paper.problem(nodes=256)
+    >>> strength = st.paper.strength(problem, correlation_ratio=0.6)
+    >>> ranges = {"marginal.low": (0.5e6, 0.8e6), "marginal.high": (1.2e6, 2.0e6)}
+    >>> prior = make_prior(problem, strength, ranges)
+    >>> likelihood = SimpleNamespace(prior=prior, method=Equilibrium())
+    >>> u = np.full((100, 2), 0.5)
+    >>> u[:8, 0], u[:9, 1], u[20:29, 0] = 0.019, 0.981, 0.981
+    >>> (note,) = _notes(likelihood, 0.25, u)
+    >>> for part in note.split(": ")[1].split(", and "):
+    ...     print(part)  # doctest: +ELLIPSIS
+    the upper end of marginal.low, 800000, holds 9% of the draws
+    the upper end of marginal.high, 2e+06, holds 9% of the draws within 2% of its range. ...
+    >>> u[:9, 0] = 0.019
+    >>> _notes(likelihood, 0.25, u)[0].split(": ")[1].split(", and ")[0]
+    'the lower end of marginal.low, 500000, holds 9% of the draws'
+    >>> [note.split(" because")[0] for note in _notes(likelihood, 0.26, np.full((100, 2), 0.5))]
+    ['the means are uncertain by about 26% of their standard deviations']
+    """
     prior, notes = likelihood.prior, []
     texts = [
         f"the {side} end of {name}, {end:g}, holds {np.mean(near):.0%} of the draws"
@@ -331,7 +369,53 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
 def _of_specimens(
     problem: Problem, profiles: Profiles, simulation: Simulation, measured: Peaks, error: float
 ) -> SpecimenPosterior:
-    """Return the posterior of mean and scatter between specimens, from profiles and peaks."""
+    """Return the posterior of mean and scatter between specimens, from profiles and peaks.
+
+    The grid of a single field has four cells of s and two of the mean. Simulations, the grid
+    and the comparison are replaced here.
+
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import patch
+    >>> class Grid(SimpleNamespace):
+    ...     def draws(self, count, rng):
+    ...         return rng.random((count, 4))
+    ...     def described(self, u):
+    ...         return {MEAN_KEY: u[:, 3], SCATTER_KEY: u[:, 2]}
+    >>> def profiles(levels, mean=None):
+    ...     prior = FactorPrior(mean=mean)
+    ...     return SimpleNamespace(levels=np.array(levels), reference=2.0, prior=prior)
+    >>> before = np.full((1, 1, 4, 2), 1 / 8)
+    >>> after = np.array([[0.5, 0.0], [0.25, 0.25], [0, 0], [0, 0]]).reshape(1, 1, 4, 2)
+    >>> kind = SimpleNamespace(area=2.0, ratios=np.full((1, 1, 8), 5.0))
+    >>> def posterior(profiles, peaks):
+    ...     both = Grid(profiles=profiles, mass=before), Grid(
+    ...         profiles=profiles, mass=after, log_evidence=-7.0)
+    ...     compared = []
+    ...     def agree(prediction, peaks, seed):
+    ...         known = prediction.peaks.values[0].size
+    ...         compared.append((prediction.grid is both[0], known, peaks.values[0].size, seed))
+    ...         return SimpleNamespace(notes=())
+    ...     with patch.multiple("stiction.inference.infer", agreement=agree,
+    ...                         tables_of=lambda *_: SimpleNamespace(onsets=(kind,)),
+    ...                         grid_of_profiles=lambda *_: both):
+    ...         found = _of_specimens("p", profiles, Simulation(None, None, 3), peaks, 0.1)
+    ...     return found, compared
+    >>> peaks = Peaks((None,), (np.array([14.0, 15.0]),), "N")
+    >>> found, compared = posterior(profiles([3.0, 5.0]), peaks)
+    >>> compared, found.log_evidence, found.monte_carlo_error  # sqrt(2/8)
+    ([(True, 0, 2, 3)], -7.0, 0.5)
+    >>> {name: round(nats, 6) for name, nats in found.information.items()}  # ln 2, and of 3/4
+    {'between': 0.693147, 'mean': 0.130812}
+    >>> found, compared = posterior(profiles([]), peaks)
+    >>> compared, found.log_evidence, [*found.information], found.agreement
+    ([], nan, ['between'], None)
+    >>> [*posterior(profiles([], mean="stated"), peaks)[0].information]
+    ['between', 'mean']
+    >>> posterior(profiles([3e3, 5e3]), peaks)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: peaks: are about 14.5 N, but predictions ... 2e+04 N. ...
+    """
     tables = tables_of(problem, profiles, simulation, measured, error)
     known = profiles.levels.size > 0
     # Without profiles the fields have the mean that the user stated.
@@ -369,7 +453,38 @@ def _of_specimens(
 
 
 def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
-    """Return the profiles of a fit, or the fields of any other source, which has no levels."""
+    """Return the profiles of a fit, or the fields of any other source, which has no levels.
+
+    >>> import stiction as st
+    >>> def interface(mean):
+    ...     law, spectrum = st.Lognormal(mean=mean, cv=0.2), st.ExponentialSpectrum(1e-3)
+    ...     return st.RandomInterface(strength=st.RandomField(law, spectrum))
+    >>> fields = [interface(1e6), interface(3e6), interface(1e6)]
+    >>> profiles = profiles_of(fields, None, None, 0)
+    >>> profiles.reference * 3.0, profiles.levels.size, profiles.within.shape
+    (5000000.0, 0, (1, 0))
+    >>> profiles.families == families_of(True), profiles.prior == FactorPrior()
+    (True, True)
+    >>> f"{profiles.fields[0].strength.mean / profiles.reference:.6f}"
+    '1.000000'
+
+    Profiles keep all but the stated prior and families.
+
+    >>> known = profiles._replace(levels=np.ones(2))
+    >>> again = profiles_of(known, {"between": (0.1, 0.3)}, "normal", 0)
+    >>> again.families, again.levels.size, round(float(again.prior.scatter.mean()), 6)
+    (('normal',), 2, 0.2)
+    >>> profiles_of(known, None, None, 0) == known
+    True
+    >>> profiles_of(fields, None, "norm", 0)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: between: family: unknown 'norm'; did you mean 'normal'? ...
+    >>> profiles_of(object.__new__(Posterior), None, None, 0)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: random: must not be a posterior. ...
+    """
     more: dict[str, Any] = {"prior": FactorPrior.of(prior)} if prior else {}
     with prefixed("between"):
         more |= {} if families is None else {"families": families_of(families)}
@@ -403,7 +518,26 @@ def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
 
 
 def _specimen_notes(grid: FactorGrid, comparison: Agreement | None) -> list[str]:
-    """Return the reasons to doubt the posterior."""
+    """Return the reasons to doubt the posterior.
+
+    >>> from types import SimpleNamespace
+    >>> def notes(shares, levels, comparison=None, prior=FactorPrior()):
+    ...     profiles = SimpleNamespace(prior=prior, levels=np.ones(levels))
+    ...     grid = SimpleNamespace(profiles=profiles, mass=np.reshape(shares, (1, 1, -1, 1)))
+    ...     return [note.split(",")[0] for note in _specimen_notes(grid, comparison)]
+
+    Half of the range is ln 2 = 0.69 nats. Four fifths are ln 5/4 nats, less than ln 4/3.
+
+    >>> notes([0.5, 0.5, 0, 0], 2)
+    []
+    >>> notes([0.25, 0.25, 0.25, 0.25, 0], 2)
+    ['the measurements say little about the scatter between specimens']
+    >>> stated = FactorPrior(scatter=1.0)
+    >>> notes([0.25, 0.25, 0.25, 0.25, 0], 2, prior=stated), notes([1, 0], 0, prior=stated)
+    ([], [])
+    >>> notes([1, 0], 1, SimpleNamespace(notes=("they differ",)))
+    ['they differ. Until then use the lower force', 'the profiles come from one specimen']
+    """
     profiles, doubts = grid.profiles, comparison.notes if comparison else ()
     until = "Until then use the lower force, from peaks or profiles alone"
     notes = [f"{text}. {until}" for text in doubts]
