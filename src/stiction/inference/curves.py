@@ -679,9 +679,9 @@ def _parts(readings: Readings, noise: float | None, split: Split | None) -> list
     if split == "cycles":
         starts, ends = turning_points(force, threshold)
         sizes = force[starts] - force[ends]
-        full = ends[sizes >= 0.5 * np.median(np.sort(sizes)[-3:])] + 1
-        if full.size == 0:
+        if sizes.size == 0:
             raise InputError("split: the record has no full slide. Leave out split")
+        full = ends[sizes >= 0.5 * np.median(np.sort(sizes)[-3:])] + 1
         return readings.part(slice(full[-1])).cut(full[:-1], "cycle")
     # Readings above HIGH, or else below LOW of the peak, and how often the force returns.
     high = force >= HIGH * force.max()
