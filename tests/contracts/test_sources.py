@@ -379,9 +379,7 @@ def test_designs_are_stresses_whatever_the_unit_of_the_peaks():
     assert (found[0].design_low < found[0].design_high)[1]
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in SOURCES if " " in name or name == "posterior"]
-)
+@pytest.mark.parametrize("name", [n for n in SOURCES if " " in n or n == "posterior"])
 def test_interfaces_of_a_source_depend_on_the_seed_alone(name):
     first, again, other = (source_of(name).interfaces(5, seed) for seed in (1, 1, 2))
     assert first == again

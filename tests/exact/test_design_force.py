@@ -78,9 +78,7 @@ LOCAL = {"method": st.LocalCriterion(), "progress": False}
 
 def scattering(mean, cv, of_factor):
     """A field that scatters by `cv` within, and a log-normal factor between specimens."""
-    field = st.RandomField(
-        st.Gamma(mean=mean, cv=cv), st.PowerLawSpectrum(4e-3), mean_mode=True
-    )
+    field = st.RandomField(st.Gamma(mean=mean, cv=cv), st.PowerLawSpectrum(4e-3), True)
     factor = st.Lognormal(mean=1.0, cv=of_factor)
     return st.RandomInterface(strength=field, between={"strength": factor})
 
