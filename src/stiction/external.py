@@ -89,6 +89,25 @@ def simulator(
     ... )
     >>> simulate([2e-3, 0.66e6]).shape
     (25,)
+
+    Samples from another first one are others, and the error of the load cell is
+    added to the same peaks.
+
+    >>> first, later = simulate([2e-3, 0.66e6]), simulate([2e-3, 0.66e6], first=5)
+    >>> bool(np.array_equal(first[5:], later[:20]))
+    True
+    >>> noisy = st.external.simulator(
+    ...     problem, strength, keys, method=st.LocalCriterion(), samples=25, load_cell_error=1e3
+    ... )
+    >>> noise = noisy([2e-3, 0.66e6]) - first
+    >>> 600.0 < float(noise.std()) < 1400.0
+    True
+    >>> abs(float(noise.mean())) < 600.0
+    True
+    >>> simulate([2e-3, 0.66e6, 1.0])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: theta: must be 2 finite numbers, correlation_length...
     """
     interface = as_random_interface(random)
     unknown: list[str] = []

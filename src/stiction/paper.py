@@ -34,6 +34,14 @@ def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") ->
         The paper states plane stress, for which G* = G (1 + nu), but
         prints G* = G/(1 - nu), which belongs to plane strain.
         ``plane="strain"`` gives the printed value.
+
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> round(problem.nucleation_length / (2.0 * 0.5788869 * 1.33e9 / 0.5e12), 6)  # G* = G (1 + nu)
+    1.0
+    >>> strain = st.paper.problem(nodes=512, plane="strain")
+    >>> round(strain.nucleation_length / problem.nucleation_length, 6) == round(1 / 0.67 / 1.33, 6)
+    True
     """
     return st.Problem(
         solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane),
@@ -56,6 +64,16 @@ def strength(problem: st.Problem, correlation_ratio: Positive = 0.5) -> st.Rando
         Problem whose nucleation length h_n sets the scale.
     correlation_ratio : float
         Ratio xi_0/h_n, positive, with xi_0 = 2 pi/lambda.
+
+    The mean of the marginal is 0.66 + 1.5/4.5 MPa.
+
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> strength = st.paper.strength(problem, correlation_ratio=0.75)
+    >>> round(strength.mean / 1e6, 6)
+    0.993333
+    >>> round(strength.spectrum.correlation_length / problem.nucleation_length, 9)
+    0.75
     """
     length = correlation_ratio * problem.nucleation_length
     return st.RandomField(

@@ -29,7 +29,19 @@ def __dir__() -> list[str]:  # what completion lists
 
 
 def as_sample(values: Any, fewest: int) -> Array:
-    """Return finite values as a flat array with at least `fewest` entries."""
+    """Return finite values as a flat array with at least `fewest` entries.
+
+    >>> as_sample([[3, 1], [2, 5]], 4).tolist()
+    [3.0, 1.0, 2.0, 5.0]
+    >>> as_sample([3.0, 1.0], 3)
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: values: at least 3 are needed, got 2
+    >>> as_sample([3.0, float("inf"), float("nan")], 3)
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: values: must be finite, but entry 1 is inf
+    """
     array = check("values", values, RealArray).ravel()
     if array.size < fewest:
         raise InputError(f"values: at least {fewest} are needed, got {array.size}")
@@ -76,6 +88,13 @@ def quantiles(values: Any, probability: RealArray) -> Quantiles:
     >>> found = quantiles(np.random.default_rng(0).normal(size=2000), [0.5])
     >>> bool(found.lower[0] < 0.0 < found.upper[0])
     True
+
+    Of 20 values, at most 5 and at least 15 lie below the median with 2 %
+    probability each, and 6 and 14 with 6 %. The 10 % quantile has no lower end.
+
+    >>> found = quantiles(np.arange(20, 0, -1.0), [0.5, 0.1])
+    >>> found.value.round(6).tolist(), found.lower.tolist(), found.upper.tolist()
+    ([10.5, 2.366667], [6.0, -inf], [15.0, 5.0])
     """
     ordered = np.sort(as_sample(values, 1))
     p = np.atleast_1d(probability)
@@ -139,6 +158,30 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     >>> found = density(np.random.default_rng(0).normal(size=2000))
     >>> bool(abs(found.value.max() - 0.4) < 0.03)  # 1/sqrt(2 pi)
     True
+
+    The density of 16 equal steps between bounds far away, and between close
+    bounds: the sum is 1, and half of the range lies on either side of the sample.
+
+    >>> values = np.arange(16.0)
+    >>> free, held = density(values, bounds=(-99.0, None)), density(values, bounds=(-0.5, 15.5))
+    >>> [round(float(part.x[0] + part.x[-1]), 6) for part in (free, held)]
+    [15.0, 15.0]
+    >>> widths = [float(part.x[1] - part.x[0]) * 4096 for part in (free, held)]
+    >>> round(widths[0], 9), round(widths[1], 9)
+    (30.0, 16.0)
+    >>> round(float(free.value.mean()) * 30.0, 9), round(float(held.value.mean()) * 16.0, 9)
+    (1.0, 1.0)
+
+    The bandwidth is 0.9 min(4.6098, 7.5/1.34) 16^(-1/5), and the error follows from it:
+
+    >>> round(free.bandwidth, 4), round(0.9 * 4.6098 * 16**-0.2, 4)
+    (2.3829, 2.3829)
+    >>> variance = held.value / (2.0 * math.sqrt(math.pi) * held.bandwidth * 16)
+    >>> np.allclose(held.error**2, variance), bool(np.abs(held.value * 16 - 1).max() < 0.1)
+    (True, True)
+    >>> skewed = density(np.r_[np.arange(15.0) / 100.0, 9.0])  # the quartiles are 0.075 apart
+    >>> round(skewed.bandwidth, 5), round(0.9 * 0.075 / 1.34 * 16**-0.2, 5)
+    (0.02893, 0.02893)
     """
     sample = as_sample(values, 16)
     smallest, largest = float(sample.min()), float(sample.max())

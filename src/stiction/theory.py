@@ -33,6 +33,12 @@ class NucleationStatistics(Result):
         E[tau_n], Pa, and Var[tau_n], Pa^2.
     strength_mean, strength_variance : float
         E[tau_p], Pa, and Var[tau_p], Pa^2.
+
+    >>> found = NucleationStatistics(
+    ...     mean=3.0, variance=4.0, strength_mean=5.0, strength_variance=16.0
+    ... )
+    >>> found.variance_ratio, [row.value for row in found._summary().rows]
+    (0.25, [3.0, 2.0, 5.0, 4.0])
     """
 
     mean: float
@@ -96,6 +102,17 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     >>> found = st.theory.nucleation_statistics(problem, strength)
     >>> bool(0.0 < found.variance_ratio < 1.0)  # averaging lowers the variance
     True
+
+    A load of 2 halves the stress, and an initial stress lowers its mean alone.
+
+    >>> from dataclasses import replace
+    >>> load = replace(problem.load, profile=2.0, initial_stress=2e5)
+    >>> other = st.theory.nucleation_statistics(replace(problem, load=load), strength)
+    >>> mean = 0.66e6 + 1e6 / 3.0  # of Beta(1.5, 3) on [0.66, 1.66] MPa
+    >>> round(found.mean / mean, 4), round(2.0 * other.mean / (mean - 2e5), 4)
+    (1.0, 1.0)
+    >>> round(other.variance / found.variance, 6), round(other.strength_mean / mean, 4)
+    (0.25, 1.0)
     """
     scale, load, initial = stationary(problem, strength)
     weakening_rate = problem.friction.uniform_weakening_rate
@@ -121,6 +138,19 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
 
     The unit of friction coefficients is the normal pressure. Raises an
     `InputError` if a value varies along the interface.
+
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> stationary(problem, strength)
+    (1.0, 1.0, 0.0)
+    >>> from dataclasses import replace
+    >>> load = replace(problem.load, initial_stress=np.linspace(0.0, 9.0, 256))
+    >>> varying = replace(problem, load=load)
+    >>> stationary(varying, strength)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: load.initial_stress: varies, so the nucleation stress ...
     """
     check_law(problem)
     refuse_specimen(problem, "this theory", "Sample the nucleation stress with st.monte_carlo")

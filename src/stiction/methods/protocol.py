@@ -129,7 +129,17 @@ class OptionalMembers:
 
 
 def optional_member(method: Any, name: str) -> Any:
-    """Return an optional member of a method, or its default."""
+    """Return an optional member of a method, or its default.
+
+    >>> from types import SimpleNamespace
+    >>> method = SimpleNamespace(scaling="affine")
+    >>> optional_member(method, "scaling"), optional_member(method, "samples_at_point")
+    ('affine', 100)
+    >>> optional_member(method, "may_differ")(None, None, None)
+    True
+    >>> optional_member(method, "bounded_by_strength")(None, "critical_stress")
+    (False, False)
+    """
     return getattr(method if hasattr(method, name) else OptionalMembers(), name)
 
 
@@ -160,7 +170,31 @@ MethodObject = Annotated[Method, SkipValidation, BeforeValidator(as_method), "Me
 
 
 def prepared(problem: Problem, method: Method) -> Solver:
-    """Return the solver of a method, which checks values and adds friction coefficients."""
+    """Return the solver of a method, which checks values and adds friction coefficients.
+
+    The mean pressure is 4 Pa, and the area 3 m², of 5 m² in total.
+
+    >>> from types import SimpleNamespace
+    >>> values = {name: np.array([6.0, 8.0]) for name in ONSET_VARIABLES}
+    >>> method = SimpleNamespace(
+    ...     label="own", prepare=lambda problem: lambda sample: values,
+    ...     variables=lambda problem: ONSET_VARIABLES,
+    ... )
+    >>> sample = SimpleNamespace(shape=(4,), samples=2, normal_pressure=np.array([4.0, 2.0]))
+    >>> sample.mean = lambda rows: rows
+    >>> problem = SimpleNamespace(area=3.0, whole_area=5.0)
+    >>> found = prepared(problem, method)(sample)
+    >>> found["friction_coefficient"].tolist(), found["critical_force"].tolist()
+    ([1.5, 4.0], [18.0, 24.0])
+    >>> sample.normal_pressure = np.full(2, np.nan)
+    >>> "friction_coefficient" in prepared(problem, method)(sample)
+    False
+    >>> method.variables = lambda problem: dict(list(ONSET_VARIABLES.items())[1:])
+    >>> prepared(problem, method)
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: method: the variables of own must include critical_load
+    """
     solver = method.prepare(problem)
     variables = method.variables(problem)
     # Other layers read these variables from any method.
@@ -184,6 +218,31 @@ def prepared(problem: Problem, method: Method) -> Solver:
 def _check_values(
     name: str, values: Values, variables: Mapping[str, Variable], sample: Sample
 ) -> None:
+    """Raise an `InputError` unless a solver returns its variables in the right shapes.
+
+    >>> from types import SimpleNamespace
+    >>> sample = SimpleNamespace(shape=(4, 5), samples=2)
+    >>> variables = {"stress": Variable("Pa", "stress"), "slip": Variable("m", "slip")}
+    >>> variables["slip"] = Variable("m", "slip", ("sample", "x", "y"))
+    >>> variables["events"] = Variable("Pa", "events", ("sample", "event"))
+    >>> values = {"stress": np.ones(2), "slip": np.ones((2, 4, 5)), "events": np.ones((2, 9))}
+    >>> _check_values("own", values, variables, sample)
+    >>> wrong = values | {"slip": np.ones((2, 5, 4))}
+    >>> _check_values("own", wrong, variables, sample)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: ...'slip' of shape (2, 4, 5) over (sample, x, y), got (2, 5, 4)
+    >>> _check_values("own", {"stress": np.ones(2)}, variables, sample)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: method: the solver of own must return its variables ...
+    >>> line = SimpleNamespace(shape=(4,), samples=2)
+    >>> way = {"way": Variable("m", "way", ("sample", DIRECTION))}
+    >>> _check_values("own", {"way": np.ones((2, 3))}, way, line)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: method: the solver of own must return 'way' of shape (2, 2) ...
+    """
     if values.keys() != variables.keys():
         raise InputError(
             f"method: the solver of {name} must return its variables {', '.join(variables)},"
@@ -203,7 +262,20 @@ def _check_values(
 
 
 def seconds_per_sample(problem: Problem, method: Method) -> float:
-    """Return the time, s, that a sample takes, at least 1 ns, or raise an `InputError`."""
+    """Return the time, s, that a sample takes, at least 1 ns, or raise an `InputError`.
+
+    >>> from types import SimpleNamespace
+    >>> for seconds in (0.25, 0.0):
+    ...     method = SimpleNamespace(seconds_per_sample=lambda problem: seconds)
+    ...     print(seconds_per_sample(None, method))
+    0.25
+    1e-09
+    >>> method = SimpleNamespace(label="own", seconds_per_sample=lambda problem: -1.0)
+    >>> seconds_per_sample(None, method)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: method: seconds_per_sample of own must ... got -1.0
+    """
     seconds = method.seconds_per_sample(problem)
     if not (is_finite(seconds) and seconds >= 0.0):
         raise InputError(
@@ -215,7 +287,15 @@ def seconds_per_sample(problem: Problem, method: Method) -> float:
 
 
 def batch_size(problem: Problem, method: Method) -> int:
-    """Return the number of samples in a batch: half a second of work, but at most 512 samples."""
+    """Return the number of samples in a batch: half a second of work, but at most 512 samples.
+
+    >>> from types import SimpleNamespace
+    >>> for seconds in (0.02, 3.0, 1e-4):
+    ...     print(batch_size(None, SimpleNamespace(seconds_per_sample=lambda problem: seconds)))
+    25
+    1
+    512
+    """
     count = int(BATCH_SECONDS / seconds_per_sample(problem, method))
     return max(1, min(MAX_BATCH_SAMPLES, count))
 
@@ -226,6 +306,17 @@ def variables_of(
     """Return the variables of a prepared solver.
 
     `pressure` is true if pressures vary by sample.
+
+    >>> from types import SimpleNamespace
+    >>> method = SimpleNamespace(variables=lambda problem: ONSET_VARIABLES)
+    >>> problem = SimpleNamespace(given_pressure=None, area=None)
+    >>> list(variables_of(problem, method)) == list(ONSET_VARIABLES)
+    True
+    >>> list(variables_of(problem, method, pressure=True))[4:]
+    ['friction_coefficient']
+    >>> problem.given_pressure, problem.area = 0.0, 2.0
+    >>> list(variables_of(problem, method))[4:]
+    ['friction_coefficient', 'critical_force', 'first_instability_force']
     """
     variables = dict(method.variables(problem))
     if pressure or problem.given_pressure is not None:
