@@ -78,10 +78,14 @@ def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Va
 
     >>> line, plane = Interface(0.8, 8), Interface((0.8, 2.0), (8, 10))
     >>> on_line, on_plane = event_variables(line), event_variables(plane)
-    >>> on_line["event_moment"].units, on_plane["event_moment"].units
-    ('N', 'N m')
-    >>> sorted(on_line.keys() - on_plane), sorted(on_plane.keys() - on_line)
-    (['event_length'], ['event_area', 'event_extent', 'event_magnitude'])
+    >>> on_line["event_moment"].units
+    'N'
+    >>> on_plane["event_moment"].units
+    'N m'
+    >>> sorted(on_line.keys() - on_plane)
+    ['event_length']
+    >>> sorted(on_plane.keys() - on_line)
+    ['event_area', 'event_extent', 'event_magnitude']
     >>> [name for name, variable in on_plane.items() if len(variable.dims) == 2]
     ['event_position', 'event_hypocentre', 'event_extent', 'event_start', 'event_end']
 
@@ -173,8 +177,10 @@ def event_table(
     Without events there is one row of NaN, or as many rows as `most` demands:
 
     >>> variables = {"event_load": Variable("Pa", "load", ("event",))}
-    >>> event_table(None, None, 0, [], variables), event_table(None, None, 0, [], variables, 2)
-    ({'event_load': array([nan])}, {'event_load': array([nan, nan])})
+    >>> event_table(None, None, 0, [], variables)
+    {'event_load': array([nan])}
+    >>> event_table(None, None, 0, [], variables, 2)
+    {'event_load': array([nan, nan])}
     """
     # Methods that lack a variable do not ask for it, so `_measures` may
     # return more.
@@ -192,12 +198,16 @@ def tabulate(
 
     >>> a, b = Variable("m", "", ("event",)), Variable("m", "", ("event", "direction"))
     >>> table = tabulate([{"a": 3.0, "b": (1.0, 2.0), "c": 7.0}], {"a": a, "b": b}, 2)
-    >>> table["a"].tolist(), table["b"].tolist()
-    ([3.0, nan], [[1.0, 2.0], [nan, nan]])
+    >>> table["a"].tolist()
+    [3.0, nan]
+    >>> table["b"].tolist()
+    [[1.0, 2.0], [nan, nan]]
     >>> tabulate([{"a": 3.0}, {"a": 4.0}], {"a": a})["a"].tolist()
     [3.0, 4.0]
-    >>> tabulate([], {"b": b})["b"].shape, tabulate([], {"b": b}, 0)["b"].shape
-    ((1, 2), (0, 2))
+    >>> tabulate([], {"b": b})["b"].shape
+    (1, 2)
+    >>> tabulate([], {"b": b}, 0)["b"].shape
+    (0, 2)
     """
     table, count = {}, len(measured)
     size = max(count, 1) if most is None else most
@@ -304,8 +314,10 @@ def _measures(problem: Problem, rows: Sample, row: int, event: ArrestedEvent) ->
     0.036
     >>> waves = event._replace(known={"event_radiated_energy": 0.05})
     >>> found = _measures(problem, rows, 1, waves)
-    >>> round(float(found["event_energy_stress_drop"]), 6), found["event_radiated_energy"]
-    (1.075, 0.05)
+    >>> round(float(found["event_energy_stress_drop"]), 6)
+    1.075
+    >>> found["event_radiated_energy"]
+    0.05
 
     In a machine, slip lowers the stress by 2 Pa/m times mean slip times profile:
 

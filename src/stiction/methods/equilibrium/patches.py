@@ -157,8 +157,10 @@ def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
 
     >>> mask = np.array([[1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0]], dtype=bool)
     >>> patches, count = labelled_patches(mask)
-    >>> patches.tolist(), count
-    ([[1, 0, 0, 1], [0, 2, 0, 0], [0, 0, 3, 0], [1, 0, 0, 0]], 3)
+    >>> patches.tolist()
+    [[1, 0, 0, 1], [0, 2, 0, 0], [0, 0, 3, 0], [1, 0, 0, 0]]
+    >>> count
+    3
     >>> labelled_patches(np.zeros((2, 3), dtype=bool))
     (array([[0, 0, 0],
            [0, 0, 0]]), 0)
@@ -241,13 +243,17 @@ def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Pa
     >>> from stiction.problem.interface import Interface
     >>> weight = np.array([2.0, 4.0, 3.0, 2.1, 0.0, 3.9, 2.0, 0.0])
     >>> inside, patch = largest_patch(weight, Interface(0.8, 8), 0.5)
-    >>> np.flatnonzero(inside).tolist(), np.round([*patch.starts, patch.area], 6).tolist()
-    ([1, 2, 3], [0.05, 0.3])
+    >>> np.flatnonzero(inside).tolist()
+    [1, 2, 3]
+    >>> np.round([*patch.starts, patch.area], 6).tolist()
+    [0.05, 0.3]
     >>> field = np.zeros((8, 10))
     >>> field[2, 3:5], field[2, 5:7], field[6] = (2.0, 7.0), (3.0, 4.0), 6.0
     >>> inside, patch = largest_patch(field, Interface((0.8, 2.0), (8, 10)), 0.5)
-    >>> np.argwhere(inside).tolist(), np.round(patch.extents, 6).tolist()
-    ([[2, 4]], [0.1, 0.2])
+    >>> np.argwhere(inside).tolist()
+    [[2, 4]]
+    >>> np.round(patch.extents, 6).tolist()
+    [0.1, 0.2]
     """
     above = weight > share * weight.max()
     if weight.ndim == 1:  # a line

@@ -71,8 +71,10 @@ LOAD_RTOL = 1e-9
 def _check_loads(loads: Any) -> Array:
     """Return loads as an array, or raise an error.
 
-    >>> _check_loads(0.5).tolist(), _check_loads([0.0, 2.0]).tolist()
-    ([0.5], [0.0, 2.0])
+    >>> _check_loads(0.5).tolist()
+    [0.5]
+    >>> _check_loads([0.0, 2.0]).tolist()
+    [0.0, 2.0]
     >>> for loads in ([2.0, 2.0], [-1.0, 3.0], [1.0, np.inf]):
     ...     try:
     ...         print(_check_loads(loads))
@@ -121,8 +123,10 @@ def _states_at(
 
     >>> missing.append(4.0)
     >>> last = ArrestedEvent(state(5.5, 0.1), state(5.5, 7.0))
-    >>> slips([1.0, 4.0, 4.5], path), slips([6.0], path._replace(sliding=last))
-    ([1.0], [71.0])
+    >>> slips([1.0, 4.0, 4.5], path)
+    [1.0]
+    >>> slips([6.0], path._replace(sliding=last))
+    [71.0]
     """
     events = path.all_events
     starts = [at_rest(sample), *(event.after for event in events)]
@@ -287,12 +291,18 @@ def _at_loads(problem: Problem, rows: Sample, given: Array, method: Any) -> dict
     ... )
     >>> method = SimpleNamespace(search=lambda problem: search)
     >>> values = _at_loads(problem, rows, np.array([5e5, 1e6, 1.7e6, 2e6, 2.1e6]), method)
-    >>> values["slip"][:, 3].round(9).tolist(), values["sliding"].tolist()
-    ([5e-07, 1e-06, 1.7e-06, 2e-06, nan], [False, False, False, False, True])
-    >>> values["mean_stress"].round(1).tolist(), values["arrested_events"].tolist()
-    ([497500.0, 995000.0, 1691500.0, 1990000.0, nan], [0, 0, 1, 1, 1])
-    >>> values["event_load"].tolist(), values["event_largest_slip"].round(12).tolist()
-    ([1000000.0], [5e-07])
+    >>> values["slip"][:, 3].round(9).tolist()
+    [5e-07, 1e-06, 1.7e-06, 2e-06, nan]
+    >>> values["sliding"].tolist()
+    [False, False, False, False, True]
+    >>> values["mean_stress"].round(1).tolist()
+    [497500.0, 995000.0, 1691500.0, 1990000.0, nan]
+    >>> values["arrested_events"].tolist()
+    [0, 0, 1, 1, 1]
+    >>> values["event_load"].tolist()
+    [1000000.0]
+    >>> values["event_largest_slip"].round(12).tolist()
+    [5e-07]
     """
     interface = problem.interface
     search = make_search(problem) if method is None else method.search(problem)

@@ -122,10 +122,14 @@ def make_contact(
     >>> K, T = np.array([[4.0, 1, 2], [1, 3, 0], [2, 0, 5]]), np.array([1.0, 0.2, 0.4])
     >>> friction = Friction(*np.array([[0.5], [0.25], [1.5]]))
     >>> state = make_contact(K, T, friction, np.zeros(3), np.array([0.7, 0.0, 0.1]))
-    >>> state.columns.T.tolist(), state.load.round(6).tolist()
-    ([[4.0, 2.5, 4.5], [1.0, 3.0, 0.0], [2.0, 0.0, 5.0]], [1.3, 0.2, 0.4])
-    >>> state.motion.tolist(), state.counts.tolist()
-    ([0, 0, 1], [1, 0, 0, 0])
+    >>> state.columns.T.tolist()
+    [[4.0, 2.5, 4.5], [1.0, 3.0, 0.0], [2.0, 0.0, 5.0]]
+    >>> state.load.round(6).tolist()
+    [1.3, 0.2, 0.4]
+    >>> state.motion.tolist()
+    [0, 0, 1]
+    >>> state.counts.tolist()
+    [1, 0, 0, 0]
     >>> int(state.inside[0]), float(state.inverse[0, 0])
     (2, 0.2)
 
@@ -133,8 +137,12 @@ def make_contact(
 
     >>> flat = Friction(*np.array([[0.5], [0.5], [1.5]]))
     >>> state = make_contact(K, T, flat, np.zeros(3), np.zeros(3), relief=10.0)
-    >>> state.columns.T.round(6).tolist(), state.relief.tolist(), float(state.weakening[0])
-    ([[18.5, 5.1, 9.7], [3.0, 3.4, 0.8], [6.0, 0.8, 6.6]], [10.0, 2.0, 4.0], 0.0)
+    >>> state.columns.T.round(6).tolist()
+    [[18.5, 5.1, 9.7], [3.0, 3.4, 0.8], [6.0, 0.8, 6.6]]
+    >>> state.relief.tolist()
+    [10.0, 2.0, 4.0]
+    >>> float(state.weakening[0])
+    0.0
     """
     n, m = len(friction.peak), len(moved)
     if relief > 0.0:
@@ -175,8 +183,10 @@ def press(K: Array, T_p: Array, friction: Friction, force: float) -> Pressed:
 
     >>> steep = friction._replace(weakening=np.array([2.5]))
     >>> pressed = press(K, np.array([1.5, -0.6, -0.4]), steep, 2.0)
-    >>> pressed.moved.round(6).tolist(), pressed.friction.peak.tolist()
-    ([0.666667, 0.0, 0.0], [0.5])
+    >>> pressed.moved.round(6).tolist()
+    [0.666667, 0.0, 0.0]
+    >>> pressed.friction.peak.tolist()
+    [0.5]
     """
     n = len(friction.peak)
     strength = friction.peak * on_cells(-T_p[n:] * force)
@@ -234,8 +244,10 @@ def begin_push(K: Array, T: Array, start: Pressed, relief: float = 0.0) -> Conta
     >>> friction = Friction(*np.array([[1.0], [0.5], [1.0]]))
     >>> start = Pressed(np.array([-1.5, -1.2, -0.8]), np.array([-0.5, 0.0, 0.0]), friction)
     >>> state = begin_push(np.eye(3), np.ones(3), start)
-    >>> state.overstress.tolist(), state.moved.tolist()
-    ([-3.0, -1.2, -0.8], [0.5, 0.0, 0.0])
+    >>> state.overstress.tolist()
+    [-3.0, -1.2, -0.8]
+    >>> state.moved.tolist()
+    [0.5, 0.0, 0.0]
     >>> residual = start._replace(friction=friction._replace(peak=friction.residual))
     >>> begin_push(np.eye(3), np.ones(3), residual).overstress.tolist()
     [-2.5, -1.2, -0.8]
@@ -286,24 +298,44 @@ class SliderPath:
     >>> rig = Rig(K, T, T_p, 2.0)
     >>> path = SliderPath(rig, 0.0, Friction(*np.array([[1.0], [0.5], [4.0]])), 2.0)
     >>> push = path.follow()
-    >>> push.first.load, push.peak, push.known, bool(push.topples), len(push.events)
-    (2.5, 2.5, True, False, 1)
+    >>> push.first.load
+    2.5
+    >>> push.peak
+    2.5
+    >>> push.known
+    True
+    >>> bool(push.topples)
+    False
+    >>> len(push.events)
+    1
     >>> before, after = push.events[0]
-    >>> before.moved.tolist(), after.moved.round(6).tolist()
-    ([0.0, 0.0, 0.0], [0.333333, 0.0, 0.0])
+    >>> before.moved.tolist()
+    [0.0, 0.0, 0.0]
+    >>> after.moved.round(6).tolist()
+    [0.333333, 0.0, 0.0]
     >>> after.forces.round(6).tolist()
     [1.0, -1.2, -0.8]
-    >>> before.direction.tolist(), before.residual, after.residual, push.last.load
-    ([1.0], False, True, 2.5)
+    >>> before.direction.tolist()
+    [1.0]
+    >>> before.residual
+    False
+    >>> after.residual
+    True
+    >>> push.last.load
+    2.5
 
     Slip of the pressing does not count as slip of the push:
 
     >>> rig = Rig(K, T, np.array([1.5, -0.6, -0.4]), 2.0)
     >>> path = SliderPath(rig, 0.0, path.friction, 2.0)
-    >>> path.state().moved.tolist(), bool(path.move(3.0) == Status.AT_TARGET)
-    ([0.0, 0.0, 0.0], True)
-    >>> path.state().moved.round(6).tolist(), path.before.round(6).tolist()
-    ([1.0, 0.0, 0.0], [0.666667, 0.0, 0.0])
+    >>> path.state().moved.tolist()
+    [0.0, 0.0, 0.0]
+    >>> bool(path.move(3.0) == Status.AT_TARGET)
+    True
+    >>> path.state().moved.round(6).tolist()
+    [1.0, 0.0, 0.0]
+    >>> path.before.round(6).tolist()
+    [0.666667, 0.0, 0.0]
     """
 
     def __init__(self, rig: Rig, relief: float, friction: Friction, force: float) -> None:
@@ -383,24 +415,36 @@ class SliderSolver:
     critical_stress 11.25
     first_instability 2.5
     critical_position 0.25
-    >>> values["arrested_events"], values["slip_patches"], values["residual_reached"]
-    (2, 0, True)
+    >>> values["arrested_events"]
+    2
+    >>> values["slip_patches"]
+    0
+    >>> values["residual_reached"]
+    True
 
     At 10 N/m it slides. Slip at 2.5 N/m is (2.5 - 1)/3 m at cell 2:
 
     >>> known = solver.at_loads(None, np.array([1.0, 2.5, 10.0]) / 0.8)
-    >>> known["slip"][:, 2].round(6).tolist(), known["sliding"].tolist()
-    ([0.0, 0.5, nan], [False, False, True])
-    >>> known["arrested_events"].tolist(), known["event_load"].round(6).tolist()
-    ([0, 1, 2], [2.5, 4.375])
+    >>> known["slip"][:, 2].round(6).tolist()
+    [0.0, 0.5, nan]
+    >>> known["sliding"].tolist()
+    [False, False, True]
+    >>> known["arrested_events"].tolist()
+    [0, 1, 2]
+    >>> known["event_load"].round(6).tolist()
+    [2.5, 4.375]
     >>> known["event_travel_step"].round(6).tolist()
     [0.333333, 0.833333]
     >>> known["event_position"].round(6).tolist()
     [0.25, 0.55]
-    >>> known["travel"].round(6).tolist(), known["crosshead_travel"].round(6).tolist()
-    ([0.25, 1.125, nan], [0.35, 1.375, nan])
-    >>> known["stress"][1, :4].round(6).tolist(), known["pressure"][1, :3].round(6).tolist()
-    ([25.0, 25.0, 10.0, 25.0], [10.0, 10.0, 10.0])
+    >>> known["travel"].round(6).tolist()
+    [0.25, 1.125, nan]
+    >>> known["crosshead_travel"].round(6).tolist()
+    [0.35, 1.375, nan]
+    >>> known["stress"][1, :4].round(6).tolist()
+    [25.0, 25.0, 10.0, 25.0]
+    >>> known["pressure"][1, :3].round(6).tolist()
+    [10.0, 10.0, 10.0]
     """
 
     def __init__(self, problem: Problem, options: Any = None) -> None:

@@ -112,8 +112,10 @@ class SamplePath(NamedTuple):
         If the interface ends, also the event in which it slides.
 
         >>> path = SamplePath(None, None, 1.0, ["a", "b"], True, None)
-        >>> path.all_events, path._replace(sliding="c").all_events
-        (['a', 'b'], ['a', 'b', 'c'])
+        >>> path.all_events
+        ['a', 'b']
+        >>> path._replace(sliding="c").all_events
+        ['a', 'b', 'c']
         """
         return self.events + ([] if self.sliding is None else [self.sliding])
 
@@ -252,10 +254,14 @@ def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> S
     ...     weakening_rate=np.stack([nodes + 1.0, nodes + 2.0]),
     ... )
     >>> sample = sample_of(rows, LINEAR, 1)
-    >>> sample.excess.tolist(), sample.residual.tolist()
-    ([20.0, 19.0, 18.0, 17.0, 16.0, 15.0], [0.0, -1.0, -2.0, -3.0, -4.0, -5.0])
-    >>> sample.weakening_rate.tolist(), sample.profile.tolist()
-    ([2.0, 3.0, 4.0, 5.0, 6.0, 7.0], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    >>> sample.excess.tolist()
+    [20.0, 19.0, 18.0, 17.0, 16.0, 15.0]
+    >>> sample.residual.tolist()
+    [0.0, -1.0, -2.0, -3.0, -4.0, -5.0]
+    >>> sample.weakening_rate.tolist()
+    [2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
+    >>> sample.profile.tolist()
+    [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
     >>> sample_of(rows, LINEAR).excess.shape
     (2, 6)
     """
@@ -450,8 +456,10 @@ class OnsetSolver:
         >>> solver._peak(path)
         7.0
         >>> interface.is_held = True
-        >>> int(solver._peak(path)), int(solver._peak(path._replace(events=[])))
-        (4, 3)
+        >>> int(solver._peak(path))
+        4
+        >>> int(solver._peak(path._replace(events=[])))
+        3
         """
         if not self.problem.interface.is_held:
             return path.peak

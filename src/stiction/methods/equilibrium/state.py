@@ -67,8 +67,10 @@ class EquilibriumState:
         >>> state = EquilibriumState(3.0, np.zeros(2), np.zeros(2))
         >>> state.highest
         3.0
-        >>> replace(state, peak=4.0).highest, replace(state, peak=0.0).highest
-        (4.0, 0.0)
+        >>> replace(state, peak=4.0).highest
+        4.0
+        >>> replace(state, peak=0.0).highest
+        0.0
         """
         return self.load if self.peak is None else self.peak
 
@@ -81,8 +83,14 @@ def at_rest(sample: StaticSample) -> EquilibriumState:
     >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
     >>> rows = np.array([[4.0, 3.0, 6.0], [1.0, 2.0, 0.0], [1.0, 2.0, 3.0], [5.0, 6.0, 7.0]])
     >>> state = at_rest(make_sample(*rows, LINEAR))
-    >>> state.load, state.slip.tolist(), state.status.name, state.Kd.tolist()
-    (1.5, [0.0, 0.0, 0.0], 'STABLE', [0.0, 0.0, 0.0])
+    >>> state.load
+    1.5
+    >>> state.slip.tolist()
+    [0.0, 0.0, 0.0]
+    >>> state.status.name
+    'STABLE'
+    >>> state.Kd.tolist()
+    [0.0, 0.0, 0.0]
     """
     load = float((sample.excess / sample.profile).min())
     slip, direction, Kd = np.zeros((3, sample.excess.size))

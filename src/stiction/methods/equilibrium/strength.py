@@ -36,8 +36,10 @@ class Pieces(NamedTuple):
     A law that falls by 1 per d_c and then by 2 per d_c steepens:
 
     >>> one, three = np.ones(1), np.ones(3)
-    >>> Pieces(one, three, np.array([1.0, 2.0, 0.0]), 1.0, 0.7).steepens, LINEAR.steepens
-    (True, False)
+    >>> Pieces(one, three, np.array([1.0, 2.0, 0.0]), 1.0, 0.7).steepens
+    True
+    >>> LINEAR.steepens
+    False
     """
 
     ends: Array  # (M,): u at the end of each piece; the last is 1
@@ -64,8 +66,12 @@ def pieces_of(law: FrictionLaw) -> Pieces:
     >>> from stiction.problem.friction import PiecewiseWeakening
     >>> law = PiecewiseWeakening(1.0, slip=[0.3, 1.0], strength=[0.4, 0.0])
     >>> pieces = pieces_of(law)
-    >>> pieces.ends.tolist(), pieces.starts.round(6).tolist(), pieces.slopes.round(6).tolist()
-    ([0.3, 1.0], [1.0, 0.571429, 0.0], [1.0, 0.285714, 0.0])
+    >>> pieces.ends.tolist()
+    [0.3, 1.0]
+    >>> pieces.starts.round(6).tolist()
+    [1.0, 0.571429, 0.0]
+    >>> pieces.slopes.round(6).tolist()
+    [1.0, 0.285714, 0.0]
     >>> round(pieces.first_slope, 6), round(pieces.area, 6)
     (2.0, 0.35)
     """
@@ -108,8 +114,10 @@ def make_sample(
     >>> excess, residual = np.array([3.0, 2.0, np.inf]), np.array([1.0, 2.0, 1.5])
     >>> p, W = np.ones(3), np.array([4.0, 7.0, 5.0])
     >>> sample = make_sample(excess, residual, p, W, LINEAR)
-    >>> sample.critical.tolist(), sample.weakening_rate.tolist()
-    ([0.5, 0.0, inf], [4.0, 0.0, 5.0])
+    >>> sample.critical.tolist()
+    [0.5, 0.0, inf]
+    >>> sample.weakening_rate.tolist()
+    [4.0, 0.0, 5.0]
     >>> steep = LINEAR._replace(first_slope=2.0)
     >>> make_sample(excess, residual, p, W, steep).critical.tolist()
     [1.0, 0.0, inf]
@@ -281,8 +289,12 @@ def present_pieces(sample: StaticSample, slip: Array) -> Present:
     >>> pieces = Pieces(np.array([0.3, 1.0]), starts, slopes, 2.0, 0.35)
     >>> sample = make_sample(np.full(3, 5.0), np.ones(3), np.ones(3), np.full(3, 8.0), pieces)
     >>> piece, strength, W = present_pieces(sample, np.array([0.5, 0.0, 1.5]))
-    >>> piece.tolist(), strength.round(6).tolist(), W.round(6).tolist()
-    ([1, 0, 2], [3.285714, 5.0, 1.0], [2.285714, 8.0, 0.0])
+    >>> piece.tolist()
+    [1, 0, 2]
+    >>> strength.round(6).tolist()
+    [3.285714, 5.0, 1.0]
+    >>> W.round(6).tolist()
+    [2.285714, 8.0, 0.0]
     """
     present = Present(np.empty(slip.size, dtype=np.int64), *np.empty((2, slip.size)))
     _find_pieces(sample, slip, present)
@@ -302,13 +314,19 @@ def step_to_corner(sample: StaticSample, slip: Array, direction: Array, limit: f
     >>> pieces = LINEAR._replace(ends=np.array([0.25, 1.0]))
     >>> sample = make_sample(np.full(4, 3.0), np.ones(4), np.ones(4), np.ones(4), pieces)
     >>> slip, direction = np.array([1.25, 0.1, 0.4, 2.5]), np.array([2.0, 2.0, 0.0, 1.0])
-    >>> step_to_corner(sample, slip, direction, np.inf), slip.tolist()
-    (0.2, [1.65, 0.5, 0.4, 2.7])
-    >>> step_to_corner(sample, slip, direction, 0.0625), slip.tolist()
-    (0.0625, [1.775, 0.625, 0.4, 2.7625])
+    >>> step_to_corner(sample, slip, direction, np.inf)
+    0.2
+    >>> slip.tolist()
+    [1.65, 0.5, 0.4, 2.7]
+    >>> step_to_corner(sample, slip, direction, 0.0625)
+    0.0625
+    >>> slip.tolist()
+    [1.775, 0.625, 0.4, 2.7625]
     >>> only_last = np.array([0.0, 0.0, 0.0, 1.0])  # at its residual strength
-    >>> step_to_corner(sample, slip, only_last, np.inf), slip.tolist()
-    (inf, [1.775, 0.625, 0.4, 2.7625])
+    >>> step_to_corner(sample, slip, only_last, np.inf)
+    inf
+    >>> slip.tolist()
+    [1.775, 0.625, 0.4, 2.7625]
     """
     step, ends = limit, sample.pieces.ends
     for i in range(slip.shape[0]):

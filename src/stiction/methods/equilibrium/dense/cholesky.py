@@ -76,8 +76,14 @@ All four steps on 24 nodes. Here `is_factor` compares L L' with A on the nodes i
 >>> workspace.queue[:13] = workspace.queue[5:18].copy()
 >>> append(workspace, 5, 13), is_factor(18)
 (18, True)
->>> remove(workspace, 18, 4), is_factor(17), remove(workspace, 17, 16), is_factor(16)
-(17, True, 16, True)
+>>> remove(workspace, 18, 4)
+17
+>>> is_factor(17)
+True
+>>> remove(workspace, 17, 16)
+16
+>>> is_factor(16)
+True
 >>> j = workspace.slipping[3]
 >>> A[j, j] = workspace.diagonal[j] = workspace.factored_diagonal[3] = K[j, j] + 2.5
 >>> raise_diagonal(workspace, 16, 3, 2.5)
@@ -92,8 +98,12 @@ more. A keeps the node that weakens less in its row:
 ...     A[j, j] = workspace.diagonal[j] = A[j, j] + amount
 >>> workspace.is_slipping[workspace.slipping[[9, 12]]] = False
 >>> workspace.is_slipping[21], kept = True, workspace.slipping[:9].tolist()
->>> change(2, 1.5), change(13, -0.5), factor_slipping(workspace), is_factor(15)
-(None, None, 15, True)
+>>> change(2, 1.5)
+>>> change(13, -0.5)
+>>> factor_slipping(workspace)
+15
+>>> is_factor(15)
+True
 >>> workspace.slipping[:9].tolist() == kept
 True
 >>> change(12, 3.5), factor_slipping(workspace), is_factor(15)

@@ -93,8 +93,10 @@ def sort_by(keys: Array, nodes: NDArray[np.int64], count: int) -> None:
 
     >>> keys, nodes = np.array([3.0, -1.0, 2.0, 0.5, -9.0]), np.arange(10, 15)
     >>> sort_by.py_func(keys, nodes, 4)
-    >>> keys.tolist(), nodes.tolist()
-    ([-1.0, 0.5, 2.0, 3.0, -9.0], [11, 13, 12, 10, 14])
+    >>> keys.tolist()
+    [-1.0, 0.5, 2.0, 3.0, -9.0]
+    >>> nodes.tolist()
+    [11, 13, 12, 10, 14]
     >>> keys = (7.0 * np.arange(41)) % 41
     >>> sort_by.py_func(keys, np.arange(41), 41)
     >>> keys.tolist() == list(range(41))
@@ -270,11 +272,15 @@ def solve_program(
     ...     gap = certificate(sample, slip, Kd, y, workspace, Ky) if cap == np.inf else 0.0
     ...     good = overload.max() < 1e-9, np.abs(overload[slip > 0]).max() < 1e-9, gap < 1e-9
     ...     return round(load / exact, 9), solved, *map(bool, good), slip
-    >>> solve(0.5)[:5], solve(9.0)[:5]
-    ((1.0, True, True, True, True), (1.0, True, True, True, True))
+    >>> solve(0.5)[:5]
+    (1.0, True, True, True, True)
+    >>> solve(9.0)[:5]
+    (1.0, True, True, True, True)
     >>> *capped, known = solve(0.5, 0.95 * exact)
-    >>> capped, solve(0.95 * exact, slip=known)[:5]
-    ([0.95, True, True, True, True], (1.0, True, True, True, True))
+    >>> capped
+    [0.95, True, True, True, True]
+    >>> solve(0.95 * exact, slip=known)[:5]
+    (1.0, True, True, True, True)
     """
     sample, slip, Kd, workspace, _, _ = state
     top = min(bound, cap)
@@ -360,8 +366,10 @@ def certificate(
     >>> slip, y = np.array([0.25, 0, 0]), np.array([1.0, 0.5, 0.0])
     >>> workspace, Ky = make_workspace(DenseEntries(K.ravel(), 3, 0.0), 3), np.zeros(3)
     >>> gap = certificate(sample, slip, K @ slip, y, workspace, Ky)
-    >>> round(gap - (3.625 / 1.5 - 2.25), 9), Ky.tolist()
-    (0.0, [1.5, 0.0, -1.5])
+    >>> round(gap - (3.625 / 1.5 - 2.25), 9)
+    0.0
+    >>> Ky.tolist()
+    [1.5, 0.0, -1.5]
     """
     n, lower, excess_y, count = slip.shape[0], np.inf, 0.0, ZERO
     # The load of (1) is the least balance over load profile, for any slip.

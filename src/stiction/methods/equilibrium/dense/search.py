@@ -94,14 +94,20 @@ class DenseSearch:
     >>> A = dense.elastic.block(i) - np.diag(sample.weakening_rate)
     >>> limits = np.column_stack((np.ones(32), -A / 1e11))
     >>> exact = -linprog(-np.eye(33)[0], limits, strength / 1e6).fun * 1e6
-    >>> round(onset.load / exact, 9), onset.certified, bool(onset.gap < 1e-9 * onset.load)
-    (1.0, True, True)
+    >>> round(onset.load / exact, 9)
+    1.0
+    >>> onset.certified
+    True
+    >>> bool(onset.gap < 1e-9 * onset.load)
+    True
     >>> dense.jump(sample, onset).outcome.name
     'SLIDING'
     >>> below = dense.at(sample, at_rest(sample), 0.97 * exact)
     >>> over = below.load - below.Kd - strength + sample.weakening_rate * below.slip
-    >>> bool(over.max() < 1.0), bool(np.abs(over[below.slip > 0]).max() < 1.0)
-    (True, True)
+    >>> bool(over.max() < 1.0)
+    True
+    >>> bool(np.abs(over[below.slip > 0]).max() < 1.0)
+    True
     """
 
     widest_gap = 1e-9
@@ -315,8 +321,10 @@ class DenseSearch:
         >>> def at(start, load=3.0):
         ...     found = DenseSearch.at(search, sample, start, load)
         ...     return found and (found.load, float(found.slip[0]), found.route.name)
-        >>> at(start), at(start, 1.0)
-        ((3.0, 0.2, 'PROGRAMME_FROM_REST'), (1.0, 0.0, 'PROGRAMME_FROM_REST'))
+        >>> at(start)
+        (3.0, 0.2, 'PROGRAMME_FROM_REST')
+        >>> at(start, 1.0)
+        (1.0, 0.0, 'PROGRAMME_FROM_REST')
         >>> at(state(0.0, route=Route.PROGRAMME))
         (1.0, 0.3, 'EVENTS')
         >>> by_programme = 0.6  # beyond the corner at 0.5 m
@@ -459,8 +467,12 @@ def present_sample(sample: StaticSample, slip: Array) -> StaticSample:
     >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
     >>> rows = np.array([[3.0, 2], [1.0, 0.5], [1, 1], [2.0, 4]])
     >>> present = present_sample(make_sample(*rows, LINEAR), np.array([1.5, 0.0]))
-    >>> present.excess.tolist(), present.weakening_rate.tolist(), present.residual.tolist()
-    ([1.0, 2.0], [0.0, 4.0], [1.0, 0.5])
+    >>> present.excess.tolist()
+    [1.0, 2.0]
+    >>> present.weakening_rate.tolist()
+    [0.0, 4.0]
+    >>> present.residual.tolist()
+    [1.0, 0.5]
     """
     present = present_pieces(sample, slip)
     return sample._replace(excess=present.strength, weakening_rate=present.weakening_rate)

@@ -68,8 +68,10 @@ def _revise(inside: Mask, slip: Array, residual: Array, tolerance: float) -> tup
     >>> inside, slip = np.array([True, True, False, False]), np.array([-0.1, 0.0, 0.0, 0.0])
     >>> _revise.py_func(inside, slip, np.array([9.0, 9.0, 0.6, 0.5]), 0.5)
     (1, 1)
-    >>> inside.tolist(), slip.tolist()
-    ([False, True, True, False], [0.0, 0.0, 0.0, 0.0])
+    >>> inside.tolist()
+    [False, True, True, False]
+    >>> slip.tolist()
+    [0.0, 0.0, 0.0, 0.0]
     """
     joined, left = 0, 0
     for i in range(slip.size):

@@ -165,8 +165,12 @@ def _narrow(bracket: Bracket, gap: float) -> float:
 
     >>> K, excess = np.array([0.0, 8, 8, 8, 8]), np.array([1.0, 2, 3, 9, 9, 9, 9, 9])
     >>> bracket = Bracket(K, 5.5, excess, np.ones(8))
-    >>> _narrow(bracket, 1e-7) < 0.0, bracket.closed(1e-7), round(bracket.upper, 5)
-    (True, True, 1.8)
+    >>> _narrow(bracket, 1e-7) < 0.0
+    True
+    >>> bracket.closed(1e-7)
+    True
+    >>> round(bracket.upper, 5)
+    1.8
     """
     share, finest = BISECTED_GAP, 0.1 * gap
     bend = 0.0
@@ -217,8 +221,12 @@ def plane_onset(
     >>> limits = np.column_stack((p.ravel(), -A))
     >>> exact = -linprog(-np.eye(193)[0], limits, excess.ravel()).fun
     >>> bracket = plane_onset(half_spaces, excess, p, W, 1e-6)
-    >>> bracket.lower < exact + 1e-9, bracket.upper > exact - 1e-9, bracket.closed(1e-6)
-    (True, True, True)
+    >>> bracket.lower < exact + 1e-9
+    True
+    >>> bracket.upper > exact - 1e-9
+    True
+    >>> bracket.closed(1e-6)
+    True
 
     If a node slips beyond its corner, the search stops at a coarse grid:
 
@@ -296,11 +304,20 @@ class PlaneSearch:
     ...     slips = state.slip > 0.0
     ...     return bool(overload.max() < 1e-4), bool(np.abs(overload[slips]).max() < 1e-4)
     >>> onset = search.next(sample)
-    >>> round(onset.load, 5), onset.certified, bool(onset.gap < 2e-6), overload(sample, onset)
-    (1.84948, True, True, (True, True))
+    >>> round(onset.load, 5)
+    1.84948
+    >>> onset.certified
+    True
+    >>> bool(onset.gap < 2e-6)
+    True
+    >>> overload(sample, onset)
+    (True, True)
     >>> reached = search.at(sample, at_rest(sample), 1.8)
-    >>> reached.load, overload(sample, reached), search.at(sample, onset, 1.9)
-    (1.8, (True, True), None)
+    >>> reached.load
+    1.8
+    >>> overload(sample, reached)
+    (True, True)
+    >>> search.at(sample, onset, 1.9)
     >>> search.jump(sample, onset).outcome.name
     'SLIDING'
 
@@ -308,8 +325,12 @@ class PlaneSearch:
 
     >>> sample = make_sample(excess, excess - 0.5, p, 15.0 + 0.5 * x, search.pieces)
     >>> turn = search.next(sample)
-    >>> turn.certified, exceeds(sample, turn.slip), overload(sample, turn)
-    (False, True, (True, True))
+    >>> turn.certified
+    False
+    >>> exceeds(sample, turn.slip)
+    True
+    >>> overload(sample, turn)
+    (True, True)
     >>> search.jump(sample, turn).outcome.name
     'SLIDING'
 
@@ -319,11 +340,17 @@ class PlaneSearch:
     >>> sample = make_sample(excess, excess - 0.5, p, 15.0 + 0.5 * x, search.pieces)
     >>> turn = search.next(sample)
     >>> jump = search.jump(sample, turn)
-    >>> jump.outcome.name, jump.state.load > turn.load, overload(sample, jump.state)
-    ('ARRESTED', True, (True, True))
+    >>> jump.outcome.name
+    'ARRESTED'
+    >>> jump.state.load > turn.load
+    True
+    >>> overload(sample, jump.state)
+    (True, True)
     >>> later = search.next(sample, jump.state)
-    >>> later.load > jump.state.load, overload(sample, later)
-    (True, (True, True))
+    >>> later.load > jump.state.load
+    True
+    >>> overload(sample, later)
+    (True, True)
     """
 
     def __init__(self, problem: Problem, gap: float = 1e-6) -> None:

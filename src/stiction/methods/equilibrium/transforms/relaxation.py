@@ -143,8 +143,10 @@ def solve_pieces(
     >>> operator, W = make_operator(np.array([0.0, 8, 8, 8, 8]), 0.0, (8,)), np.full(8, 2.0)
     >>> W[0], drive = 4.0, np.array([3.0, 1, -3, -9, -9, -9, -9, -9])
     >>> status, slip = solve_pieces(operator, drive, W, np.zeros(8), 1e-9)
-    >>> status == SOLVED, slip[:3].round(6).tolist()
-    (True, [1.142857, 0.428571, 0.0])
+    >>> status == SOLVED
+    True
+    >>> slip[:3].round(6).tolist()
+    [1.142857, 0.428571, 0.0]
     """
     # Nodes that the load alone would overload begin inside; the others
     # join if they must.
@@ -212,13 +214,16 @@ def stable_equilibrium(
     ...     end = stable_equilibrium(operator, sample, load, start, 1e-9, start)
     ...     return None if end is None else end[:3].round(5).tolist()
     >>> W = np.full(8, 2.0)
-    >>> slip_at(2.0, residual - 9.0, W), slip_at(2.0, residual, W)
-    ([0.20833, 0.04167, 0.0], [0.17647, 0.03529, 0.0])
+    >>> slip_at(2.0, residual - 9.0, W)
+    [0.20833, 0.04167, 0.0]
+    >>> slip_at(2.0, residual, W)
+    [0.17647, 0.03529, 0.0]
 
     With W = 5.5 Pa/m, the path turns at 1.8 Pa (`fold.follow_to_turn`):
 
-    >>> slip_at(1.7, residual - 9.0, W + 3.5), slip_at(2.0, residual - 9.0, W + 3.5)
-    ([0.6, 0.2, 0.0], None)
+    >>> slip_at(1.7, residual - 9.0, W + 3.5)
+    [0.6, 0.2, 0.0]
+    >>> slip_at(2.0, residual - 9.0, W + 3.5)
 
     On a steep second piece, node 0 has the stiffness 7 - 9 Pa/m and jumps,
     although it is stable before and after. On a flat one, 7 d = 3 - 0.6 + d:
@@ -419,10 +424,14 @@ def least_equilibrium(
     ...     sample = make_sample(excess, residual, np.ones(8), np.full(8, 9.0), LINEAR)
     ...     found = least_equilibrium(operator, sample, load, slip * np.eye(8)[0], **options)
     ...     return found.status.name, found.slip[:3].round(4).tolist()
-    >>> end(1.5, 9.0), end(1.5, 1.6)
-    (('ARRESTED', [0.2, 0.0, 0.0]), ('ARRESTED', [0.2333, 0.2333, 0.0]))
-    >>> end(0.99, 9.0, 0.01, is_unstable=True), end(9.5, 9.0)[0]
-    (('ARRESTED', [0.1271, 0.0, 0.0]), 'SLIDING')
+    >>> end(1.5, 9.0)
+    ('ARRESTED', [0.2, 0.0, 0.0])
+    >>> end(1.5, 1.6)
+    ('ARRESTED', [0.2333, 0.2333, 0.0])
+    >>> end(0.99, 9.0, 0.01, is_unstable=True)
+    ('ARRESTED', [0.1271, 0.0, 0.0])
+    >>> end(9.5, 9.0)[0]
+    'SLIDING'
 
     If the interface ends, it slides when every node that can break slips:
 

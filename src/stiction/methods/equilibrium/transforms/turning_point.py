@@ -122,8 +122,10 @@ def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | 
     >>> np.allclose(held.slip, [d, d, d, 0, 0, 0, 0, 0], atol=1e-6)
     True
     >>> root, (amplitude, _, slope, force, slope_of_force, by_load) = 3**0.5, held[1:]
-    >>> np.allclose(slope, phi, atol=1e-6), round(slope_of_force, 6)
-    (True, -0.5)
+    >>> np.allclose(slope, phi, atol=1e-6)
+    True
+    >>> round(slope_of_force, 6)
+    -0.5
     >>> numbers = amplitude / root, force / root, by_load / root
     >>> np.allclose(numbers, [d, 11 * (0.6 - d), -1.0], atol=1e-6)
     True
@@ -168,8 +170,10 @@ def _other_patch(bracket: Bracket) -> Array | None:
     >>> K, excess = np.array([0.0, 8, 8, 8, 8]), np.array([1.0, 2, 3, 9, 9, 9, 9, 9])
     >>> bracket = Bracket(K, 5.5, excess, np.ones(8))
     >>> bracket.inside[:3], bracket.operator.direction[:] = True, [-1, 2, 3, 4, 0, 0, 0, 0]
-    >>> np.abs(_other_patch(bracket)[:4]).round(3).tolist(), round(bracket.upper, 3)
-    ([0.577, 0.577, 0.577, 0.0], 2.0)
+    >>> np.abs(_other_patch(bracket)[:4]).round(3).tolist()
+    [0.577, 0.577, 0.577, 0.0]
+    >>> round(bracket.upper, 3)
+    2.0
     >>> bracket.operator.direction[:] = 0.0
     >>> _other_patch(bracket) is None
     True
@@ -191,8 +195,12 @@ def _load_at(state: Held, amplitude: float, curvature: float = 0.0) -> float:
     The force 3 + (0.5 - 0.5 x 2/2) x 2 Pa at a + 2 falls by 4 per load:
 
     >>> state = Held(10.0, 5.0, None, None, 3.0, 0.5, -4.0)
-    >>> _load_at(state, 7.0), _load_at(state, 7.0, -0.5), _load_at(state, 5.0)
-    (11.0, 10.75, 10.75)
+    >>> _load_at(state, 7.0)
+    11.0
+    >>> _load_at(state, 7.0, -0.5)
+    10.75
+    >>> _load_at(state, 5.0)
+    10.75
     """
     step = amplitude - state.amplitude
     force = state.force + (state.slope_of_force + 0.5 * curvature * step) * step
@@ -286,16 +294,24 @@ def close_by_newton(
     >>> slip, phi = np.array([[0.7, 0.3, 0, 0, 0, 0, 0, 0], [2, 2, 1, 0, 0, 0, 0, 0]])
     >>> bracket = Bracket(K, 5.5, excess, np.ones(8))
     >>> closed, bend = close_by_newton(bracket, phi / 3.0, 1.75, slip, 1e-6)
-    >>> closed, round(bracket.lower, 4), round(bracket.upper, 4), bend < 0.0
-    (True, 1.8, 1.8, True)
+    >>> closed
+    True
+    >>> round(bracket.lower, 4)
+    1.8
+    >>> round(bracket.upper, 4)
+    1.8
+    >>> bend < 0.0
+    True
     >>> close_by_newton(bracket, phi, 1.75, slip, 1e-6, -4.0)  # closed already
     (True, -4.0)
 
     If node 5 is held, the patch of nodes 0 to 2 is unstable, and is held instead:
 
     >>> bracket = Bracket(K, 5.5, excess, np.ones(8))
-    >>> close_by_newton(bracket, np.eye(8)[5], 1.9, slip, 1e-6)[0], round(bracket.upper, 4)
-    (True, 1.8)
+    >>> close_by_newton(bracket, np.eye(8)[5], 1.9, slip, 1e-6)[0]
+    True
+    >>> round(bracket.upper, 4)
+    1.8
     """
     if bracket.closed(gap):
         return True, bend
