@@ -133,7 +133,30 @@ class Equilibrium(Listed):
     _shown = ()
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """Return the approximate time for a sample on a core, s."""
+        """Return the approximate time for a sample on a core, s.
+
+        The size to the power 1.5 is 8 for 4096 nodes. A law with two pieces takes
+        longer, and a machine with stiffness longer still:
+
+        >>> from types import SimpleNamespace
+        >>> import stiction as st
+        >>> line = SimpleNamespace(is_plane=False, size=4096)
+        >>> linear = st.LinearWeakening(1.0)
+        >>> pieces = st.PiecewiseWeakening(1.0, slip=[0.3, 1.0], strength=[0.4, 0.0])
+        >>> def seconds(interface=line, friction=linear, specimen=None):
+        ...     parts = {"interface": interface, "friction": friction, "specimen": specimen}
+        ...     return round(Equilibrium().seconds_per_sample(SimpleNamespace(**parts)), 6)
+        >>> def blocks(kind, stiffness):
+        ...     return SimpleNamespace(drive=SimpleNamespace(type=kind, stiffness=stiffness))
+        >>> seconds(), seconds(friction=pieces)
+        (0.0042, 0.034141)
+        >>> [seconds(specimen=blocks(*drive)) for drive in (("platen", 0), ("platen", 1), ("top", 0))]
+        [0.2402, 1.2002, 1.2002]
+        >>> seconds(SimpleNamespace(is_plane=True, size=300))
+        0.003
+        >>> seconds(SimpleNamespace(is_plane=False, size=100), specimen=Slider.__new__(Slider))
+        0.002
+        """
         interface = problem.interface
         if interface.is_plane:
             return 1e-5 * interface.size
@@ -150,7 +173,25 @@ class Equilibrium(Listed):
         return 2e-4 + 5e-4 * more * (interface.size / 1024) ** 1.5
 
     def supports(self, problem: Problem) -> list[str]:
-        """Return the reasons why the method cannot solve a problem, or an empty list."""
+        """Return the reasons why the method cannot solve a problem, or an empty list.
+
+        >>> from types import SimpleNamespace
+        >>> import stiction as st
+        >>> def reasons(method, is_plane, **friction):
+        ...     law = st.LinearWeakening(1.0)
+        ...     if friction:
+        ...         law = st.PiecewiseWeakening(1.0, slip=[0.3, 1.0], **friction)
+        ...     interface = SimpleNamespace(is_plane=is_plane)
+        ...     problem = SimpleNamespace(friction=law, interface=interface, specimen=None)
+        ...     return [reason.split(":")[0] for reason in method.supports(problem)]
+        >>> tight, sensitive = Equilibrium(tolerance=1e-8), Equilibrium(sensitivity=True)
+        >>> for is_plane in (False, True):
+        ...     print(reasons(tight, is_plane), reasons(sensitive, is_plane))
+        ['tolerance'] []
+        [] ['sensitivity']
+        >>> [reasons(Equilibrium(), is_plane, strength=[1.0, 0.0]) for is_plane in (False, True)]
+        [[], ['friction.strength']]
+        """
         reasons = refused(problem)
         if problem.friction.plateau and problem.interface.is_plane:
             reasons.append(
@@ -179,6 +220,24 @@ class Equilibrium(Listed):
         happen, and has no bound. If the interface ends, slip lowers the
         mean stress of the part that can break. On a slider, the
         pressure changes the strength.
+
+        >>> from types import SimpleNamespace
+        >>> def bounded(event, is_held=False, specimen=None, has_machine=False):
+        ...     interface = SimpleNamespace(is_held=is_held)
+        ...     parts = {"specimen": specimen, "has_machine": has_machine}
+        ...     problem = SimpleNamespace(interface=interface, **parts)
+        ...     return Equilibrium().bounded_by_strength(problem, event)
+        >>> first = "first_instability"
+        >>> bounded(first)
+        (True, True)
+        >>> bounded(first, has_machine=True)
+        (False, False)
+        >>> bounded("static_friction", has_machine=True)
+        (True, True)
+        >>> bounded(first, is_held=True)
+        (False, False)
+        >>> bounded(first, specimen=Slider.__new__(Slider))
+        (False, False)
         """
         if problem.interface.is_held or isinstance(problem.specimen, Slider):
             return False, False
@@ -188,7 +247,32 @@ class Equilibrium(Listed):
         return certain, certain
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
-        """Return the variables in the solver's results."""
+        """Return the variables in the solver's results.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.problem.interface import Interface
+        >>> def names(method, interface, specimen=None):
+        ...     problem = SimpleNamespace(interface=interface, specimen=specimen)
+        ...     return method.variables(problem)
+        >>> line, plane = Interface(0.8, 8), Interface((0.8, 2.0), (8, 10))
+        >>> on_line, on_plane = (names(Equilibrium(), interface) for interface in (line, plane))
+        >>> sorted(on_line.keys() - on_plane)
+        ['critical_patch_length']
+        >>> [name for name, variable in on_plane.items() if "direction" in variable.dims]
+        ['critical_position', 'sliding_position', 'critical_patch_extent']
+        >>> sorted(names(Equilibrium(slip=True), line).keys() - on_line)
+        ['slip']
+        >>> sorted(names(Equilibrium(), line, Slider.__new__(Slider)).keys() - on_line)
+        ['open_fraction']
+        >>> with_events = names(Equilibrium(events=2), line)
+        >>> set(of_samples(event_variables(line))) == with_events.keys() - on_line
+        True
+        >>> with_events["event_load"].dims
+        ('sample', 'event')
+        >>> pushed = names(Equilibrium(events=2), line, Slider.__new__(Slider))
+        >>> sorted(with_events.keys() - pushed)
+        ['event_energy_stress_drop', 'event_fracture_energy']
+        """
         interface = problem.interface
         # On planes, positions and extents have
         # a component along each direction.
