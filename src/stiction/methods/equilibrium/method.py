@@ -150,7 +150,8 @@ class Equilibrium(Listed):
         ...     return SimpleNamespace(drive=SimpleNamespace(type=kind, stiffness=stiffness))
         >>> seconds(), seconds(friction=pieces)
         (0.0042, 0.034141)
-        >>> [seconds(specimen=blocks(*drive)) for drive in (("platen", 0), ("platen", 1), ("top", 0))]
+        >>> drives = ("platen", 0), ("platen", 1), ("top", 0)
+        >>> [seconds(specimen=blocks(*drive)) for drive in drives]
         [0.2402, 1.2002, 1.2002]
         >>> seconds(SimpleNamespace(is_plane=True, size=300))
         0.003
