@@ -82,6 +82,18 @@ class Solid(Listed):
 
     @model_validator(mode="after")
     def _plausible(self) -> Solid:
+        """Doubt a shear wave speed that no solid has.
+
+        A stiff solid, above 2000 kg/m3, has a speed of at least 50 m/s:
+
+        >>> import warnings
+        >>> with warnings.catch_warnings(record=True) as told:
+        ...     warnings.simplefilter("always")
+        ...     for modulus, density in ((4.9e6, 2000.0), (4.9e6, 2001.0), (5.1e6, 2001.0)):
+        ...         _ = Solid(modulus, 0.25, density)
+        >>> [str(warning.message)[:71] for warning in told]
+        ['solid: the shear wave speed is 49.49 m/s, which no solid has at such a ']
+        """
         speed = self.shear_wave_speed
         dense, (slowest, fastest) = self.density > SOFT_DENSITY, POSSIBLE_SPEED
         text = (

@@ -221,6 +221,17 @@ class Blocks(Listed):
 
     @model_validator(mode="after")
     def _consistent(self) -> Blocks:
+        """Refuse a pusher beyond the side, and a machine that needs the thickness.
+
+        >>> def refused(**drive):
+        ...     try:
+        ...         Blocks(height=1.0, drive=Platen(**drive))
+        ...     except InputError as error:
+        ...         return str(error)[:38]
+        >>> refused(stiffness=math.inf) or refused(stiffness=0.0)
+        >>> refused(stiffness=3.0), refused(mass=2.0)
+        ('Blocks: thickness: is needed with driv', 'Blocks: thickness: is needed with driv')
+        """
         drive, problems = self.drive, _beyond_side(self.drive, self.height)
         if self.thickness is None and (drive.mass or 0.0 < drive.stiffness < math.inf):
             problems.append(
@@ -352,6 +363,20 @@ class Slider(Listed):
 
     @model_validator(mode="after")
     def _consistent(self) -> Slider:
+        """Refuse drives and presses that a slider cannot have.
+
+        >>> pusher, base = {"height": 0.2, "width": 0.1}, Base(height=1.0)
+        >>> def refused(drive, **given):
+        ...     try:
+        ...         Slider(height=1.0, base=base, drive=drive, **given)
+        ...     except InputError as error:
+        ...         return [text[8:25] for text in error.problems]
+        >>> refused(Pusher(**pusher), tilt=0.5) or refused(TopShear(stiffness=math.inf))
+        >>> refused(Pusher(**pusher, side="both", mass=2.0)), refused(TopShear(stiffness=3.0))
+        (['drive.side: a sli', 'drive.mass: has n'], ['thickness: is nee'])
+        >>> refused(TopShear(), tilt=0.5, pressing="plate")
+        ['tilt: a plate doe']
+        """
         problems = _beyond_side(self.drive, self.height)
         if isinstance(self.drive, Pusher):
             if self.drive.side == "both":

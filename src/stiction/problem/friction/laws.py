@@ -79,6 +79,23 @@ class FrictionLaw(Listed):
 
     @model_validator(mode="after")
     def _one_scale(self) -> Any:
+        r"""Refuse values that cannot be, two scales, and two residual strengths.
+
+        >>> def refused(**given):
+        ...     try:
+        ...         LinearWeakening(**given)
+        ...     except InputError as error:
+        ...         print(*[text.partition(": ")[2][:81] for text in error.problems], sep="\n")
+        >>> refused(residual_ratio=0.0, residual_strength=0.0)
+        >>> refused(residual_ratio=[0.5, 1.0], critical_slip=[2.0, 0.0, -3.0])
+        critical_slip must be positive everywhere, got -3
+        residual_ratio must lie in [0, 1), got 1
+        >>> refused(residual_strength=[3.0, -1.0], weakening_rate=1.0, fracture_energy=2.0)
+        residual_strength must not be negative, got -1
+        give one of weakening_rate, critical_slip, fracture_energy, got weakening_rate an
+        >>> refused(residual_ratio=0.0, residual_strength=[0.0, 3.0])
+        give either residual_strength or residual_ratio, got both
+        """
         problems = []
         values = {name: getattr(self, name) for name in _VALID}
         given = {name: value for name, value in values.items() if value is not None}
@@ -157,7 +174,11 @@ class FrictionLaw(Listed):
 
     @property
     def initial_slope(self) -> float:
-        """-f' where f first falls: at zero slip, or after a plateau."""
+        """-f' where f first falls: at zero slip, or after a plateau.
+
+        >>> PiecewiseWeakening(slip=[0.25, 1.0], strength=[0.5, 0.0]).initial_slope
+        2.0
+        """
         return float(self.parameters.initial_slope)
 
     @cached_property
@@ -174,17 +195,29 @@ class FrictionLaw(Listed):
 
     @property
     def plateau(self) -> float:
-        """Slip u up to which the strength does not fall, 0 for most laws."""
+        """Slip u up to which the strength does not fall, 0 for most laws.
+
+        >>> LinearWeakening().plateau
+        0.0
+        """
         return 0.0
 
     @property
     def integral(self) -> float:
-        """Integral of f(u) over all u >= 0."""
+        """Integral of f(u) over all u >= 0.
+
+        >>> LinearWeakening().integral, ExponentialWeakening().integral
+        (0.5, 1.0)
+        """
         return float(self.area(np.inf))
 
     @property
     def linear(self) -> bool:
-        """Whether strength falls along a straight line to the residual strength."""
+        """Whether strength falls along a straight line to the residual strength.
+
+        >>> LinearWeakening().linear, ExponentialWeakening().linear
+        (True, False)
+        """
         return isinstance(self.parameters, Linear)
 
     @property
@@ -423,6 +456,23 @@ class PiecewiseWeakening(FrictionLaw):
 
     @model_validator(mode="after")
     def _falling(self) -> PiecewiseWeakening:
+        """Refuse corners that do not fall from 1 to 0 while the slip rises to 1.
+
+        >>> def refused(slip, strength):
+        ...     try:
+        ...         PiecewiseWeakening(slip=slip, strength=strength)
+        ...     except InputError as error:
+        ...         return str(error).partition(": ")[2][:33]
+        >>> refused([1.0], [0.0]) or refused([0.5, 1.0], [1.0, 0.0])
+        >>> refused([0.5, 1.0], [0.0]), refused([], [])
+        ('slip and strength: must have equa', 'slip and strength: must have equa')
+        >>> refused([0.0, 1.0], [0.5, 0.0]), refused([0.5, 0.9], [0.5, 0.0])
+        ('slip: must increase from above 0 ', 'slip: must increase from above 0 ')
+        >>> [refused([0.25, 0.5, 1.0], f) for f in ([1.0, 1.0, 0.0], [0.5, 0.5, 0.0])]
+        ['strength: must decrease at every ', 'strength: must decrease at every ']
+        >>> refused([0.5, 1.0], [1.1, 0.0]), refused([0.5, 1.0], [0.5, 0.1])
+        ('strength: must decrease at every ', 'strength: must decrease at every ')
+        """
         slip, strength = self.corners
         if slip.size != strength.size or slip.size < 2:
             given = f"{slip.size - 1} and {strength.size - 1}"

@@ -457,7 +457,17 @@ def _read_npy(content: bytes) -> Array:
 
 
 def _read_netcdf(content: bytes) -> xr.Dataset:
-    """Return the numeric variables with their units, without dimensions of length one."""
+    """Return the numeric variables with their units, without dimensions of length one.
+
+    >>> import tempfile
+    >>> import xarray as xr
+    >>> path = Path(tempfile.mkdtemp()) / "a.nc"
+    >>> force = (["n", "k"], [[3.0], [4.5]], {"units": "kN", "by": "AB"})
+    >>> xr.Dataset({"F": force, "who": ("n", ["A", "B"])}).to_netcdf(path, engine="h5netcdf")
+    >>> data = _read_netcdf(path.read_bytes())
+    >>> [*data.data_vars], data.F.values.tolist(), data.F.dims, data.F.attrs
+    (['F'], [3.0, 4.5], ('n',), {'units': 'kN'})
+    """
     data = read_netcdf(content).squeeze(drop=True)
     data = data[[name for name, variable in data.items() if variable.dtype.kind in "fiu"]]
     data.attrs = {}
