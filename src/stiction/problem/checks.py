@@ -84,7 +84,7 @@ def contradictions_of(
     Nodes that never break have an infinite strength. A finite strength may
     be 1e8 times the median:
 
-    >>> strength[1, 3], strength[1, 4] = 5e8, np.inf
+    >>> strength[1, 3], strength[1, 2], strength[1, 0] = 5e8, np.inf, 4.0
     >>> contradictions_of(line, strength, residual, 0.0 * initial, False)
     []
     >>> strength[1, 3] = 6e8
@@ -93,7 +93,7 @@ def contradictions_of(
 
     A sample whose strength is nowhere above the residual strength:
 
-    >>> strength[1], residual[2] = 6.0, np.linspace(5.0, 7.0, 8)
+    >>> strength[1], residual[2], strength[2, 3] = 6.0, np.linspace(5.0, 7.0, 8), np.inf
     >>> text = contradictions_of(line, strength, residual, 0.0 * initial, False)[0]
     >>> print(text.partition(". ")[2])
     In sample 2 strength is 5 to 5 Pa, and residual_strength is 5 to 7 Pa. Check both units
@@ -150,6 +150,14 @@ def steepest_weakening_rate(strength: Array, residual: Array, weakening_rate: Ar
     >>> steepest_weakening_rate(strength[:1], residual[:1], rates[:1])
     20.0
     >>> steepest_weakening_rate(strength[:1, 1:4], residual[:1, 1:4], rates[:1, 1:4])
+    20.0
+    >>> steepest_weakening_rate(strength[:1, :4], residual[:1, :4], rates[:1, :4])
+    9.0
+
+    The lower quartile by rank is the first and smallest of four drops, 4:
+
+    >>> strength[1] = 9.0, 43.0, 5.0, np.inf, 5.5
+    >>> steepest_weakening_rate(strength, residual, rates)
     20.0
     """
     drop = strength - residual

@@ -184,7 +184,7 @@ def on_nodes(value: Any, quantity: str, interface: Interface) -> Placed:
     node. Coefficients of friction are told from stresses:
 
     >>> import xarray as xr
-    >>> line, x = Interface(4.0, 8), np.array([3.5, 0.5, 4.0, 1.0])
+    >>> line, x = Interface(4.0, 8), np.array([3.5, 0.499, 4.0, 1.001])
     >>> profile = xr.DataArray([1.0, 2.0, 3.0, 4.0], {"x": x}, ["x"], attrs={"units": "1"})
     >>> quantity, values = on_nodes(profile, "strength", line)
     >>> quantity, values.tolist(), on_nodes(profile, "height", line).quantity
@@ -283,8 +283,8 @@ def _offset(dim: str, x: Array, interface: Interface) -> float:
     ...         warnings.simplefilter("always")
     ...         by = _offset("x", np.array(x), Interface(4.0, 8, **given))
     ...     return round(by, 9), [str(warning.message)[:25] for warning in told]
-    >>> offset([0.0, 0.5, 1.0]), offset([2.005, 1.505, 2.505])
-    ((0.0, []), (0.01, []))
+    >>> offset([0.0, 0.504, 1.0]), offset([2.005, 1.505, 2.505]), offset(np.linspace(0.0, 4.0, 9))
+    ((0.002666667, []), (0.01, []), (0.0, []))
     >>> offset([0.1, 0.6]), offset([0.4, 0.9])
     ((0.2, ['x is offset by 0.2 of a s']), (-0.2, ['x is offset by -0.2 of a ']))
     >>> offset([0.25, 0.75])[0], offset([0.25, 0.75], ends="free")
@@ -388,8 +388,10 @@ def as_rows(placed: Placed, name: str, interface: Interface) -> Placed:
     ((3, 1), (), (3, 1, 1))
     >>> shape("strength", 3, 1), shape("friction_coefficient")
     ('must have shape (8,) or (samples, 8)', 'must have shape (8,) or (samples, 8)')
-    >>> shape("height", 7), shape("height", 0, 8) == shape("height", 7)
-    ('must have shape (8,), (samples, 8), (samples, 1) or a number', True)
+    >>> shape("height", 3, 7)
+    'must have shape (8,), (samples, 8), (samples, 1) or a number'
+    >>> shape("height", 7) == shape("height", 0, 8) == shape("height", 3, 7)
+    True
     >>> gap = Placed("height", np.array([1.0] * 7 + [np.nan]))
     >>> as_rows(gap, "height", line)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
@@ -590,6 +592,16 @@ def own_sample(
     Only values are checked here, because some samples may not fit
     the problem. The caller checks the resolution, and the nodes
     that do not weaken, for all samples together.
+
+    >>> import stiction as st
+    >>> law = st.LinearWeakening(critical_slip=2.0)
+    >>> problem = st.Problem(st.Solid(1e9, 0.25, 1200.0), st.Interface(8.0, 8), law)
+    >>> own_sample(problem, {"strength": np.full((2, 8), 3.0)}).weakening_rate[:, 0].tolist()
+    [1.5, 1.5]
+    >>> own_sample(problem, {"strength": np.full((2, 8), np.inf)})  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: strength: must be finite. Entry (0, 0) is inf ...
     """
     for name, rows in profiles.items():
         with prefixed(name):
@@ -626,9 +638,10 @@ def made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) -
     A profile precedes the problem. Nodes beyond the extent have an infinite
     strength and the fastest rate:
 
-    >>> result = sample(strength=strength, weakening_rate=np.array([[7.0]]))
-    >>> result.weakening_rate[0, ::3].tolist()
-    [7.0, 7.0, 7.0]
+    >>> given = {"weakening_rate": np.array([[7.0]]), "residual_strength": np.array([[1.0]])}
+    >>> result = sample(strength=strength, **given)
+    >>> result.weakening_rate[0, ::3].tolist(), result.residual_strength[0, :2].tolist()
+    ([7.0, 7.0, 7.0], [1.0, 1.0])
     >>> result = sample((2.0, 4.0), strength=strength)
     >>> result.strength.tolist(), result.weakening_rate[0].tolist()
     ([[inf, inf, 7.0, 5.0, 4.0, inf, inf, inf]], [2.0, 2.0, 2.0, 1.0, 0.5, 2.0, 2.0, 2.0])
@@ -683,7 +696,22 @@ def made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) -
 
 
 def accepted_again(problem: Any, sample: Sample, accept: Collection[str]) -> Sample:
-    """Return a given `Sample`, or refuse a sample that another problem made."""
+    """Return a given `Sample`, or refuse a sample that another problem made.
+
+    >>> from types import SimpleNamespace
+    >>> problem = SimpleNamespace(interface=Interface(8.0, 8))
+    >>> sample = SimpleNamespace(problem=problem, initial_stress=np.full((1, 8), 5.0))
+    >>> sample.strength, sample.residual_strength = np.full((1, 8), 5.0), np.full((1, 8), 2.0)
+    >>> accepted_again(problem, sample, {"overstress"}) is sample
+    True
+    >>> for owner in (problem, SimpleNamespace()):
+    ...     try:
+    ...         accepted_again(owner, sample, ())
+    ...     except InputError as error:
+    ...         print(str(error)[:48])
+    strength: must be above initial_stress. At x = 0
+    profiles: the sample belongs to another problem.
+    """
     if sample.problem != problem:
         raise InputError("profiles: the sample belongs to another problem. Call problem.sample")
     profiles = sample.strength, sample.residual_strength, sample.initial_stress
