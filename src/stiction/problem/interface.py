@@ -138,6 +138,13 @@ class Ellipse(Listed):
 
     @model_validator(mode="after")
     def _positive(self) -> Ellipse:
+        """Refuse an ellipse without an area.
+
+        >>> Ellipse(centre=(-5.0, 0.0), semi_axes=(3.0, 0.0))
+        Traceback (most recent call last):
+        ...
+        stiction.base.errors.InputError: Ellipse: semi_axes: must be positive, got (3.0, 0.0)
+        """
         if min(self.semi_axes) <= 0.0:
             raise InputError(f"semi_axes: must be positive, got {self.semi_axes}")
         return self
@@ -267,6 +274,23 @@ class Interface(Listed):
 
     @model_validator(mode="after")
     def _one_geometry(self) -> Interface:
+        """Refuse parts that do not make a line or a plane.
+
+        >>> def refused(*given, **more):
+        ...     try:
+        ...         Interface(*given, **more)
+        ...     except InputError as error:
+        ...         return str(error)[11:39]
+        >>> refused(8.0, 8, width=0.5) or refused(9e-30, 8) or refused((8.0, 4.0), (2**13, 2**11))
+        >>> refused((8.0, 4.0), 8), refused(8.0, (8, 8))
+        ('length and nodes: give one n', 'length and nodes: give one n')
+        >>> refused((8.0, 4.0), (8, 8), width=0.5), refused((8.0, 4.0), (8, 8), ends="free")
+        ('width: lengths of a plane gi', 'ends: a plane is periodic. O')
+        >>> refused((8.0, 4.0), (2**13, 2**11 + 2)), refused(7e-30, 8)
+        ('nodes: must be at most 2^24 ', 'length: nodes are 8.75e-31 m')
+        >>> refused(8.0, 8, extent=[True] * 6), refused(8.0, 8, extent=((1.0, 2.0), (3.0, 4.0)))
+        ('extent: a mask must have the', 'extent: must be two ends or ')
+        """
         if isinstance(self.length, tuple) != isinstance(self.nodes, tuple):
             raise InputError(
                 "length and nodes: give one number of each for a line, or two of each for a plane,"

@@ -109,7 +109,9 @@ def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> 
     >>> sample({"friction_coefficient": coefficients}, 5e7).strength[:, 3].round(3).tolist()
     [20000000.0, 30000000.0]
     >>> pressed = {"friction_coefficient": coefficients, "normal_pressure": [[5e7], [4e7]]}
-    >>> result = sample(pressed)
+    >>> result = sample(pressed | {"residual_strength": np.full((1, 64), 3.0)})
+    >>> result.residual_strength[:, 3].tolist()
+    [3.0, 3.0]
     >>> result.strength[:, 3].round(3).tolist(), result.normal_pressure[:, 3].tolist()
     ([20000000.0, 24000000.0], [50000000.0, 40000000.0])
     >>> for wrong in ({"residual_strength": np.ones((3, 1))}, {"weakening_rate": "a"}):
@@ -188,8 +190,8 @@ def at_nodes(key: str, value: Any, interface: Interface, *, missing: bool = Fals
     >>> gaps = xr.DataArray([3.0, 4.0], {"x": [0.5, 0.0]}, ["x"], attrs={"units": "mm"})
     >>> at_nodes("friction.critical_slip", gaps, line, missing=True)[:3].tolist()
     [0.004, 0.003, nan]
-    >>> at_nodes("load.profile", [1.0, 2.0], line)
-    array([1., 2.])
+    >>> at_nodes("load.profile", [1.0, np.nan], line)
+    array([ 1., nan])
     >>> at_nodes("friction.critical_slip", gaps, line)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
