@@ -86,6 +86,19 @@ class Load(Listed):
 
     @model_validator(mode="after")
     def _consistent(self) -> Load:
+        r"""Refuse a profile or a pressure with the wrong sign, and two normal forces.
+
+        >>> def refused(**given):
+        ...     try:
+        ...         Load(**given)
+        ...     except InputError as error:
+        ...         print(*[text.partition(": ")[2][:65] for text in error.problems], sep="\n")
+        >>> refused(profile=[0.1, 3.0], normal_pressure=[3.0, -2.0])
+        >>> refused(profile=[0.0, 3.0], normal_pressure=[3.0, -3.0], pressing_force=2.0)
+        profile must be positive everywhere, got 0
+        normal_pressure must be positive on average, got 0
+        pressing_force: give either normal_pressure (Pa) or pressing_forc
+        """
         profile, pressure, problems = self.profile, self.normal_pressure, []
         if not is_unplaced(profile) and np.min(profile) <= 0.0:
             problems.append(f"profile must be positive everywhere, got {np.min(profile):g}")
@@ -225,7 +238,26 @@ class Problem(Listed):
         return problems
 
     def _of_slider(self, slider: Slider) -> list[str]:
-        """Return messages about inputs that do not fit a slider."""
+        """Return messages about inputs that do not fit a slider.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.problem.friction import LinearWeakening
+        >>> from stiction.problem.specimen import Base, TopShear
+        >>> slider = Slider(height=0.1, base=Base(height=0.1), drive=TopShear())
+        >>> solid = Solid(1e9, 0.2, 1e3)
+        >>> part = SimpleNamespace(interface=Interface(0.25, 16), solid=solid, mode="II")
+        >>> def messages(load, **given):
+        ...     part.load, part.friction = Load(**load), LinearWeakening(**given)
+        ...     return [text[:29] for text in Problem._of_slider(part, slider)]
+        >>> messages({"pressing_force": 5.0}, residual_ratio=0.5)
+        []
+        >>> messages({"normal_pressure": 5.0}, residual_strength=2.0)
+        ['friction.residual_strength: a']
+        >>> messages({"initial_stress": 3.0})
+        ['load.initial_stress: follows ', 'load: a slider needs a normal']
+        >>> messages({"normal_pressure": [5.0, 6.0]})
+        ['load.normal_pressure: follows']
+        """
         load: Any = self.load
         interface = self.interface
         given = {
@@ -245,7 +277,29 @@ class Problem(Listed):
         return problems
 
     def _check_drive(self) -> None:
-        """Refuse blocks that open, and doubt a machine whose stiffness has no effect."""
+        """Refuse blocks that open, and doubt a machine whose stiffness has no effect.
+
+        The blocks have 0.5 x 0.5 m x 4 GPa = 1 GN/m:
+
+        >>> import warnings
+        >>> from types import SimpleNamespace
+        >>> from stiction.problem.specimen import Platen
+        >>> def check(stiffness, pressure=(1.0, 2.0)):
+        ...     drive = Platen(stiffness=stiffness)
+        ...     part = SimpleNamespace(specimen=Blocks(height=1.0, thickness=0.5, drive=drive))
+        ...     part.blocks = SimpleNamespace(pressure=np.array(pressure), drive_stiffness=4e9)
+        ...     part.interface = Interface(8.0, 8)
+        ...     with warnings.catch_warnings(record=True) as told:
+        ...         warnings.simplefilter("always")
+        ...         Problem._check_drive(part)
+        ...     return [str(warning.message)[:44] for warning in told]
+        >>> check(1.1e5), check(0.0), check(9e4)
+        ([], [], ['specimen.drive.stiffness: 9e+04 N/m hardly d'])
+        >>> check(0.0, (1.0, -0.5))  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ...
+        stiction.base.errors.InputError: ... opens the interface at x = 1 m, ... -0.5 times ...
+        """
         pressure = self.blocks.pressure
         if not pressure.min() > 0.0:
             place = self.interface.describe_node(int(np.argmin(pressure)))
@@ -303,7 +357,19 @@ class Problem(Listed):
 
     @property
     def blocks(self) -> Driven:
-        """Stiffness and profiles of the specimen, which must be given."""
+        """Stiffness and profiles of the specimen, which must be given.
+
+        >>> from types import SimpleNamespace
+        >>> part = SimpleNamespace(specimen=Blocks(height=1.0))
+        >>> part.blocks = SimpleNamespace(shear=[2.0])
+        >>> Problem.load_profile.func(part)
+        [2.0]
+        >>> part = SimpleNamespace(specimen=None)
+        >>> Problem.blocks.fget(part)
+        Traceback (most recent call last):
+        ...
+        stiction.base.errors.InputError: problem.specimen: must be Blocks here
+        """
         if not isinstance(self.specimen, Blocks):
             raise InputError("problem.specimen: must be Blocks here")
         interface = self.interface
@@ -311,7 +377,23 @@ class Problem(Listed):
 
     @property
     def rig(self) -> Rig:
-        """Stiffness and loads of the slider, which must be given."""
+        """Stiffness and loads of the slider, which must be given.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.problem.specimen import Base, TopShear
+        >>> slider = Slider(height=0.1, base=Base(height=0.1), drive=TopShear())
+        >>> rig = SimpleNamespace(T=np.array([0.25, 0.75, 9.0]))
+        >>> part = SimpleNamespace(specimen=slider, rig=rig, interface=SimpleNamespace(size=2))
+        >>> Problem.load_profile.func(part).tolist()
+        [0.5, 1.5]
+        >>> part.solid = Solid(1e9, 0.2, 1e3)
+        >>> f"{Problem.effective_modulus.func(part):.6g}"
+        '1.25e+09'
+        >>> Problem.rig.fget(SimpleNamespace(specimen=None))
+        Traceback (most recent call last):
+        ...
+        stiction.base.errors.InputError: problem.specimen: must be a Slider here
+        """
         if not isinstance(self.specimen, Slider):
             raise InputError("problem.specimen: must be a Slider here")
         return self.specimen.rig(self.interface.measure, self.interface.size, self.solid)
