@@ -709,9 +709,9 @@ def conditioning_of(
 
     `random` is a `stiction.random.fields.RandomInterface`.
 
-    The residual strength was measured, and has the correlation 0.6 with the
-    strength. Where it was measured, z has the mean (2 / 0.5) (6 - 5) / 0.5
-    / (1 + (2 / 0.5)^2).
+    The residual strength was measured at one place, and has the correlation
+    0.6 with the strength. Its z at this place has the mean (2 / 0.5) (6 -
+    5) / 0.5 / (1 + (2 / 0.5)^2).
 
     >>> import scipy.stats
     >>> import stiction as st

@@ -208,8 +208,8 @@ class RandomField(Listed):
     def quantile(self, interface: Interface, probability: Share) -> Array:
         """Return the quantile of the field at each node, given the measured values.
 
-        Where v = 5 + 2 z was measured as 6 with the error 0.5, z has the mean
-        (2 / 0.5) (6 - 5) / 0.5 / 17 and the variance 1 / 17.
+        If v = 5 + 2 z was measured as 6 with the error 0.5, z at this place
+        has the mean (2 / 0.5) (6 - 5) / 0.5 / 17 and the variance 1 / 17.
 
         >>> import scipy.stats
         >>> import stiction as st
