@@ -239,8 +239,9 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> Iterable[tuple[Array,
     Drops below the largest threshold of the tests do not count, because
     a load cell could not distinguish them from noise.
 
-    Sample 0 has drops from 5 to 2 and from 8 to 7.5, and the second one is below the larger
-    threshold. Sample 1 has one event, and sample 2 has no peak.
+    Sample 0 has drops from 5 to 2 and from 8 to 7.5, and the second
+    one is below the larger threshold. Sample 1 has one event, and
+    sample 2 has no peak.
 
     >>> from types import SimpleNamespace
     >>> data = xr.Dataset({
@@ -359,7 +360,8 @@ def _predicted_peaks(prediction: xr.Dataset, measured: Peaks) -> Array:
 def _permuted(peaks: Array, values: Array, replicates: int, rng: Any) -> Array:
     """Return both distances, for the measured choice and random choices (1 + replicates, 2).
 
-    The distances by their definition, for the measured values and for each other choice:
+    The distances by their definition, for the measured values and
+    for each other choice:
 
     >>> from itertools import combinations
     >>> def distances(chosen, rest):
@@ -396,8 +398,9 @@ def _with_posterior(
 ) -> Agreement:
     """Compare with campaigns drawn from the posterior (steps 4 to 6).
 
-    Peaks are uniform in this posterior for all parameters. The measured kinds of specimens are
-    in another order than the fitted kinds.
+    Peaks are uniform in this posterior for all parameters. The
+    measured kinds of specimens are in another order than the fitted
+    kinds.
 
     >>> from types import SimpleNamespace
     >>> flat = SimpleNamespace(parts=lambda u: np.zeros((len(u), LAW_VALUES)))
@@ -417,8 +420,8 @@ def _with_posterior(
     >>> bool(np.isclose(found.largest_deviation, max(d[0] for _, d in pairs)))
     True
 
-    Both deviations are below q with the probability 0.9 if q is about 1.1, the quantile of two
-    campaigns with one and two tests.
+    Both deviations are below q with the probability 0.9 if q is
+    about 1.1, the quantile of two campaigns with one and two tests.
 
     >>> 0.9 < found.band < 1.25, found.p_values["cramer_von_mises"] > 0.05
     (True, True)
@@ -473,7 +476,8 @@ def _with_posterior(
 def _peaks_at(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[Array, Array]:
     """Return peaks (points, LAW_VALUES) at parameters u, and the fraction of peaks up to each.
 
-    The density of a peak y is y^u here: uniform for u = 0 and linear for u = 1.
+    The density of a peak y is y^u here: uniform for u = 0 and
+    linear for u = 1.
 
     >>> from types import SimpleNamespace
     >>> def of(peaks, kinds):

@@ -117,7 +117,8 @@ def bootstrapped(
 
     Examples
     --------
-    Simulated records are one random number here, and the fit to a number below 0.1 fails.
+    Simulated records are one random number here, and the fit to a
+    number below 0.1 fails.
 
     >>> from types import SimpleNamespace
     >>> from unittest.mock import patch
@@ -179,9 +180,11 @@ def at_ends(around: Refits) -> list[BestFit]:
 
     Examples
     --------
-    A correlation length of 1.5 m is fitted. One repetition has 4 times and one has a quarter of
-    it. The widths are proportional to the root of the length, so the first interval ends at
-    1.5/4^(1/2) and 1.5*4^2. The second end lies beyond the searched range.
+    A correlation length of 1.5 m is fitted. One repetition has 4
+    times and one has a quarter of it. The widths are proportional
+    to the root of the length, so the first interval ends at
+    1.5/4^(1/2) and 1.5*4^2. The second end lies beyond the searched
+    range.
 
     >>> from types import SimpleNamespace
     >>> from stiction.inference.estimate import FitSetting
@@ -267,7 +270,8 @@ class Scale(NamedTuple):
     def of(self, fitted: BestFit) -> tuple[float, float]:
         """Return an estimate on this scale, and the width of step 3.
 
-        The width grows with the root of the length, for a location also with the scatter.
+        The width grows with the root of the length, for a location
+        also with the scatter.
 
         >>> from types import SimpleNamespace
         >>> numbers = {"efolding_length": 9.0, "standard_deviation": 2.0}
@@ -288,8 +292,8 @@ class Scale(NamedTuple):
     def less(self, fitted: BestFit, repeated: Refits) -> Array:
         """Return the estimate minus the error of each repetition (steps 3 and 7).
 
-        The estimate is 10, with width 2*2. Refits to records with mean 8 give 9 with width 3*1,
-        and 6 with width 1*3.
+        The estimate is 10, with width 2*2. Refits to records with
+        mean 8 give 9 with width 3*1, and 6 with width 1*3.
 
         >>> from types import SimpleNamespace
         >>> def fit(mean, length, deviation):
@@ -331,9 +335,11 @@ def intervals(repeated: Sequence[Refits], values: Array) -> dict[str, tuple[floa
 
     Examples
     --------
-    The weibull quantiles of 19 repetitions are the least and the largest one. Fields with the
-    shorter length have errors of log 3 (once) or log 2, and fields with the longer length have
-    -log 5 (once) or -log 4. The shape rises with the length here, and the ratio falls.
+    The weibull quantiles of 19 repetitions are the least and the
+    largest one. Fields with the shorter length have errors of log 3
+    (once) or log 2, and fields with the longer length have -log 5
+    (once) or -log 4. The shape rises with the length here, and the
+    ratio falls.
 
     >>> from types import SimpleNamespace
     >>> family = SimpleNamespace(limited_shapes=("shape",), quiet=lambda values, noise: values)
@@ -352,7 +358,8 @@ def intervals(repeated: Sequence[Refits], values: Array) -> dict[str, tuple[floa
     >>> np.round(ends["anisotropy"], 6).tolist()  # 5/2, and 5*4
     [2.5, 20.0]
 
-    If a repetition reaches the limit of a shape, its interval contains the repetitions.
+    If a repetition reaches the limit of a shape, its interval
+    contains the repetitions.
 
     >>> around.fits[0].parameters["shape"] = 1.0
     >>> shorter.fits[:2] = [fit(3.0), fit(4.0)]
@@ -363,13 +370,15 @@ def intervals(repeated: Sequence[Refits], values: Array) -> dict[str, tuple[floa
     >>> ends["anisotropy"]  # 25/5 at both ends, so the range is shown
     (0.05, 20.0)
 
-    Without any error, the interval of a limited parameter is the whole range.
+    Without any error, the interval of a limited parameter is the
+    whole range.
 
     >>> intervals([Refits(fit(), [fit()] * 19)], np.array([2.5, 8.0]))["anisotropy"]
     (0.05, 20.0)
 
-    The variance of the noise is 0.04 - 0.05 to 0.04 + 0.03 here. Bounds of the marginal lie
-    outside the values, and at most 10 ranges of the values away.
+    The variance of the noise is 0.04 - 0.05 to 0.04 + 0.03 here.
+    Bounds of the marginal lie outside the values, and at most 10
+    ranges of the values away.
 
     >>> def bounded(distance, variance):
     ...     numbers = {"marginal.low": 4.0 - distance, "marginal.high": 4.0 + distance}
@@ -460,8 +469,8 @@ def limits_of(fitted: BestFit, values: Array, noise: float) -> dict[str, tuple[f
 
     Examples
     --------
-    The values are 2, 4 and 9. Noise with a quarter of their variance, 26/3, leaves values from
-    5 - 3*0.866 to 5 + 4*0.866.
+    The values are 2, 4 and 9. Noise with a quarter of their
+    variance, 26/3, leaves values from 5 - 3*0.866 to 5 + 4*0.866.
 
     >>> from types import SimpleNamespace
     >>> setting = SimpleNamespace(marginal=Family("beta", {}))
@@ -509,8 +518,9 @@ def likely(repeated: Refits, measured: Array, quantity: str) -> list[RandomField
 
     Examples
     --------
-    The widths are equal, so an error of 1 in the mean, or a factor in another parameter, is
-    subtracted from, or divides, the estimate.
+    The widths are equal, so an error of 1 in the mean, or a factor
+    in another parameter, is subtracted from, or divides, the
+    estimate.
 
     >>> from types import SimpleNamespace
     >>> from stiction.random.marginals import Lognormal
@@ -530,8 +540,9 @@ def likely(repeated: Refits, measured: Array, quantity: str) -> list[RandomField
     >>> np.round([field.mean, field.marginal.cv, field.spectrum.correlation_length], 6).tolist()
     [7.0, 0.16, 1.0]
 
-    The lower bound has the distance 4 from the mean, and 5 in the repetition. The likely bound,
-    5 - 4*4/5, would give the mean 5.48 and the standard deviation 1.84. Both stay, although the
+    The lower bound has the distance 4 from the mean, and 5 in the
+    repetition. The likely bound, 5 - 4*4/5, would give the mean
+    5.48 and the standard deviation 1.84. Both stay, although the
     bound must lie below the least value, 1.5.
 
     >>> law = Beta(alpha=2.0, beta=3.0, low=1.0, high=11.0)

@@ -168,7 +168,8 @@ class Curve(Result):
     peak_error: float = 0.0
 
     def _row(self, name: str) -> Row:
-        """Return a row with the peak and, as its remark, all other results.
+        """Return a row with the peak and, as its remark, all other
+        results.
 
         >>> at, none = np.zeros(0), Drops(*np.zeros((3, 0)))
         >>> two = Drops(*np.array([[1, 2], [7, 8], [0.5, 3]]))
@@ -247,7 +248,8 @@ class Curves(Sequence[Curve], Result):
         # Files with the same columns are shown once.
         """Return the summary of all tests.
 
-        Readings that differ only in their source or number of values are shown once.
+        Readings that differ only in their source or number of
+        values are shown once.
 
         >>> at, drops = np.zeros(0), Drops(*np.zeros((3, 0)))
         >>> curve = Curve("a", at, at, "N", "m", 0.0, 0.0, 4.0, 0.0, drops, 3.0)
@@ -442,8 +444,8 @@ def _tables(source: Any, options: Options) -> Iterator[tuple[str, Table]]:
     >>> [(column.name, column.unit) for column in table.columns]
     [('travel', 'mm'), ('force', '')]
 
-    A folder gives its text files and workbooks in order, without hidden files and copies that
-    an editor keeps.
+    A folder gives its text files and workbooks in order, without
+    hidden files and copies that an editor keeps.
 
     >>> import tempfile
     >>> folder = Path(tempfile.mkdtemp())
@@ -493,7 +495,8 @@ def _travel_of(columns: Sequence[Column], wanted: Wanted) -> Column:
     >>> chosen(("time", "s"), ("travel", "mm")), chosen(("travel", "%"), ("time", "s"))
     (1, 1)
 
-    The headings 'x' and 'x_value' count only if no other heading is a travel.
+    The headings 'x' and 'x_value' count only if no other heading is
+    a travel.
 
     >>> chosen(("x", "mm"), ("travel", "mm")), chosen(("x", "mm"), ("time", "s"))
     (1, 0)
@@ -546,7 +549,8 @@ def _tests_of(table: Table, readings: Readings) -> Iterator[tuple[str, Any]]:
     ...     pairs = _tests_of(Table(made, "a", lines, begins=begins), readings)
     ...     return [(label, rows.nonzero()[0].tolist()) for label, rows in pairs]
 
-    A column may number the tests. If one of its numbers is missing, it does not count.
+    A column may number the tests. If one of its numbers is missing,
+    it does not count.
 
     >>> tests([0, 1, 2, 3], [1, 2, 3, 4], test=[7, 7, 2, 7])
     [(', test 7', [0, 1, 3]), (', test 2', [2])]
@@ -557,8 +561,9 @@ def _tests_of(table: Table, readings: Readings) -> Iterator[tuple[str, Any]]:
     >>> tests([0, 1, 2], [1, 2, 3], **{"test time": [3, 4, 4]})
     [('', [0, 1, 2])]
 
-    An empty line separates tests if the travel goes back, and a remark always does. The first
-    of the `begins` is the first table.
+    An empty line separates tests if the travel goes back, and a
+    remark always does. The first of the `begins` is the first
+    table.
 
     >>> tests([0, 1, 1, 0, 1, 0, 1], [1, 2, 4, 6, 7, 8, 9])
     [(', test 1', [0, 1, 2]), (', test 2', [3, 4, 5, 6])]
@@ -591,7 +596,8 @@ def _parts(readings: Readings, noise: float | None, split: Split | None) -> list
     >>> parts([0, 1, 2, 30, 3, 4, 5, 6, 7])  # a spike
     [('a', [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])]
 
-    Forces of the other sign count if they exceed a fifth of the largest force, here 1 N.
+    Forces of the other sign count if they exceed a fifth of the
+    largest force, here 1 N.
 
     >>> for part in parts([-1, 3, 4, -0.1, 0.2, -0.3, -5, -4, -0.1, 2, 3], split="strokes"):
     ...     print(part)
@@ -611,7 +617,8 @@ def _parts(readings: Readings, noise: float | None, split: Split | None) -> list
         ...
     stiction.base.errors.InputError: all forces are zero
 
-    The sign of the travel changes if it ends at least nine tenths of its range below its start.
+    The sign of the travel changes if it ends at least nine tenths
+    of its range below its start.
 
     >>> force = np.arange(10.0)
     >>> for last, unit in ((1, "m"), (1, "s"), (2, "m")):
@@ -623,8 +630,9 @@ def _parts(readings: Readings, noise: float | None, split: Split | None) -> list
     >>> float(_parts(Readings("a", "N", "m", 0.0 * at, force, at), 0.0, None)[0].travel[0])
     0.0
 
-    Full slides are 6, 3 and 8 N here. A slide of 2.5 N is less than half of the median of the
-    largest three, and the force after the last full slide is left out.
+    Full slides are 6, 3 and 8 N here. A slide of 2.5 N is less than
+    half of the median of the largest three, and the force after the
+    last full slide is left out.
 
     >>> for part in parts([0, 4, 8, 2, 6, 3, 5, 2.5, 9, 1, 3], split="cycles"):
     ...     print(part)
@@ -636,7 +644,8 @@ def _parts(readings: Readings, noise: float | None, split: Split | None) -> list
         ...
     stiction.base.errors.InputError: split: the record has no full slide. Leave out split
 
-    A return ends at 0.8 of the peak or above, after a force below 0.7 of the peak.
+    A return ends at 0.8 of the peak or above, after a force below
+    0.7 of the peak.
 
     >>> len(parts([0, 10, 7, 10, 6, 8, 6.9, 9, 6]))
     1
@@ -708,7 +717,8 @@ def _threshold(force: Array, noise: float | None) -> tuple[float, float]:
         ...
     stiction.base.errors.InputError: holds 7 readings, but at least 8 are needed
 
-    The noise is measured up to the peak, unless the peak comes too early.
+    The noise is measured up to the peak, unless the peak comes too
+    early.
 
     >>> _threshold(np.r_[np.arange(9.0), 3, 5, 2, 6, 1, 7, 0, 7], None)[0]
     0.0
@@ -728,7 +738,8 @@ def _threshold(force: Array, noise: float | None) -> tuple[float, float]:
 def _without_spikes(readings: Readings, threshold: float) -> Readings:
     """Leave out single readings that are far above both neighbours, and warn about them.
 
-    Steps are 1 N. A spike rises above both neighbours by more than the threshold and 3 N.
+    Steps are 1 N. A spike rises above both neighbours by more than
+    the threshold and 3 N.
 
     >>> from stiction.base.errors import collect_warnings
     >>> at = np.arange(9.0)
@@ -741,7 +752,8 @@ def _without_spikes(readings: Readings, threshold: float) -> Readings:
     >>> print(*caught)  # doctest: +ELLIPSIS
     a: 1 single readings are far above ..., such as 9 N in line 7.0. They are left out
 
-    Several spikes are noise, a rise below a twentieth of the peak is small, and a jump stays.
+    Several spikes are noise, a rise below a twentieth of the peak
+    is small, and a jump stays.
 
     >>> def size(*force):
     ...     return _without_spikes(readings._replace(force=np.array(force)), 0.1).force.size
@@ -785,7 +797,8 @@ def _curve(readings: Readings, noise: float | None, split: Split | None) -> Curv
     >>> _curve(readings, 0.0, "tables").plateau == curve.plateau
     True
 
-    Travel may go back by a twentieth of its range, here 0.9, and time may not go back.
+    Travel may go back by a twentieth of its range, here 0.9, and
+    time may not go back.
 
     >>> def back(by, unit="m", split=None):
     ...     at = np.r_[2.0 * np.arange(5), 8.0 - by, np.arange(6.0, 10) * 2.0]
@@ -802,8 +815,9 @@ def _curve(readings: Readings, noise: float | None, split: Split | None) -> Curv
         ...
     stiction.base.errors.InputError: line 15.0: travel or time goes back. Read one cycle ...
 
-    Three equal largest readings in a row may be a saturated load cell, if the force has noise.
-    A force at the start may be a load cell that was not tared.
+    Three equal largest readings in a row may be a saturated load
+    cell, if the force has noise. A force at the start may be a load
+    cell that was not tared.
 
     >>> from stiction.base.errors import collect_warnings
     >>> def warned(*force, noise=0.0, split=None):
@@ -865,8 +879,8 @@ def _curve(readings: Readings, noise: float | None, split: Split | None) -> Curv
 def _peak(force: Array, top: int, noise: float, threshold: float) -> tuple[float, float]:
     """Return the peak, corrected for the bias due to noise, and its standard error (step 4).
 
-    A parabola of 13 readings has its peak, 9, in the middle. This reading is 0.5 too large.
-    The fit gives it the weight 25/143.
+    A parabola of 13 readings has its peak, 9, in the middle. This
+    reading is 0.5 too large. The fit gives it the weight 25/143.
 
     >>> force = np.r_[-1, 5, -1, 9.0 - 0.25 * np.arange(-6, 7) ** 2, -1, 5]
     >>> force[9] += 0.5
@@ -897,8 +911,9 @@ def _peak(force: Array, top: int, noise: float, threshold: float) -> tuple[float
 def _plateau(force: Array, threshold: float) -> float:
     """Return the mean force of the slide after the peak, NaN without a fall (step 6).
 
-    The last reading within 1 N of the peak is 9 N. The median after it is 4.2 N. Three quarters
-    of the fall end at 5.65 N. The last reading is unloading, because it is below 2.1 N.
+    The last reading within 1 N of the peak is 9 N. The median after
+    it is 4.2 N. Three quarters of the fall end at 5.65 N. The last
+    reading is unloading, because it is below 2.1 N.
 
     >>> force = np.array([0, 10, 8, 9, 8, 6, 4, 5.2, 3.6, 4.2, 1.0])
     >>> f"{_plateau(force, 1.0):.4f}"  # the mean of 4, 5.2, 3.6 and 4.2
@@ -966,7 +981,8 @@ def turning_points(force: Array, threshold: float) -> tuple[Any, Any]:
 
     Examples
     --------
-    A change by the threshold is not a turning point, and the first of equal readings counts.
+    A change by the threshold is not a turning point, and the first
+    of equal readings counts.
 
     >>> starts, ends = turning_points(np.array([0, 5, 4, 6, 3, 4, 2, 2, 7, 7, 5, 1, 2.0]), 1.0)
     >>> starts.tolist(), ends.tolist()

@@ -77,7 +77,8 @@ class Densities(NamedTuple):
     def between(self, index: NDArray[np.int64], weight: Array) -> Array:
         """Return bound, mean and spread, interpolated at points, with shape (3, points).
 
-        The first point lies between the nodes 0 and 2, and the second one at node 1.
+        The first point lies between the nodes 0 and 2, and the
+        second one at node 1.
 
         >>> nodes = np.array([[1, 2, 5], [10, 30, 50], [0.1, 0.7, 0.5]])
         >>> index, weight = np.array([[0, 2], [1, 0]]), np.array([[0.25, 0.75], [1, 0]])
@@ -97,8 +98,8 @@ def grouped(ordered: Array) -> tuple[Array, Array]:
 
     Examples
     --------
-    Three values give three groups. The middle group is the smallest, and has only a part of the
-    middle value.
+    Three values give three groups. The middle group is the
+    smallest, and has only a part of the middle value.
 
     >>> means, share = grouped(np.array([-1, 1, 5.0]))
     >>> half = ndtr(ndtri(5 / 6) / 3.0) - 0.5
@@ -129,7 +130,8 @@ def to_v(onsets: Array, bound: Array) -> Array:
 
     Examples
     --------
-    The second onset of the first node lies on its bound, and 1 is the mean distance.
+    The second onset of the first node lies on its bound, and 1 is
+    the mean distance.
 
     >>> v = to_v(np.array([[3, 1], [6, 4.0]]), np.array([1, 2]))
     >>> bool(np.allclose(v, np.log([[2, 1e-9], [4, 2]])))
@@ -151,8 +153,9 @@ def densities_of(onsets: Array, bound: Array) -> Densities:
     >>> bool(np.allclose(known.spread, [np.log([1, 2, 6]).std(), np.log([1, 4, 9]).std()]))
     True
 
-    Each row is the logarithm of a density with mean 0 and variance 1. Far out it is one kernel,
-    whose width determines the curvature.
+    Each row is the logarithm of a density with mean 0 and variance
+    1. Far out it is one kernel, whose width determines the
+    curvature.
 
     >>> z, p = np.linspace(-10, 10, known.table.shape[1]), np.exp(known.table)
     >>> moments = np.stack([p.sum(axis=1), p @ z, p @ z**2]) * STEP
@@ -195,7 +198,8 @@ def densities_of(onsets: Array, bound: Array) -> Densities:
 def _interpolated(table: Array, index: NDArray[np.int64], weight: Array, z: float) -> float:
     """Return the logarithm of the standardised density at z (step 5).
 
-    The rows of the table are k and 1000 + k^2. At z = -9.89, k is 2.2.
+    The rows of the table are k and 1000 + k^2. At z = -9.89, k is
+    2.2.
 
     >>> k = np.arange(401.0)
     >>> table, near = np.stack([0 * k, k, 1000 + k**2]), np.array([1, 2])
@@ -203,7 +207,8 @@ def _interpolated(table: Array, index: NDArray[np.int64], weight: Array, z: floa
     >>> f"{_interpolated(table, near, weight, -9.89):.6f}"  # 0.75 * 2.2 + 0.25 * 1005
     '252.900000'
 
-    Beyond the table, 2 above its last value and 1 below its first value:
+    Beyond the table, 2 above its last value and 1 below its first
+    value:
 
     >>> [_interpolated(table, near[:1], np.ones(1), z) for z in (12.0, -11.0)]
     [100.0, -100.0]
@@ -233,7 +238,8 @@ def _with_error(
 
     `of_v` holds bound, mean and spread.
 
-    A normal v with mean 0.3 and standard deviation 0.4, and its integral as a sum over many z:
+    A normal v with mean 0.3 and standard deviation 0.4, and its
+    integral as a sum over many z:
 
     >>> rows = -0.5 * np.linspace(-10, 10, 401)[None] ** 2 - 0.5 * math.log(2.0 * math.pi)
     >>> z = np.linspace(-9.9, 9.9, 100_001)
@@ -290,8 +296,9 @@ def log_likelihoods(
 
     Examples
     --------
-    A normal v gives a log-normal density of the onsets above the bound, here 1 and 0.5. Onsets
-    are shifted by 2 and stretched by 3. The last peak lies below both bounds.
+    A normal v gives a log-normal density of the onsets above the
+    bound, here 1 and 0.5. Onsets are shifted by 2 and stretched by
+    3. The last peak lies below both bounds.
 
     >>> table = -0.5 * np.linspace(-10, 10, 401)[None] ** 2 - 0.5 * math.log(2.0 * math.pi)
     >>> index, weight, out = np.zeros((2, 1), dtype=np.int64), np.ones((2, 1)), np.zeros((2, 2))

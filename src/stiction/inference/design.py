@@ -295,8 +295,9 @@ def _information(
 ) -> Array:  # fmt: skip
     """Return the expected information about each parameter, and the standard error, as (2, ...).
 
-    Two kinds of peaks are normal here, with the standard deviation s about a parameter. The
-    entropy of the posterior is log(s/sqrt(n) (2 pi e)^(1/2)) for n peaks, and of the prior 0. A
+    Two kinds of peaks are normal here, with the standard deviation
+    s about a parameter. The entropy of the posterior is
+    log(s/sqrt(n) (2 pi e)^(1/2)) for n peaks, and of the prior 0. A
     known parameter has NaN.
 
     >>> from types import SimpleNamespace
@@ -386,7 +387,8 @@ def _present(
     Specimens of the problem come first. Further tests and the design
     are for them.
 
-    The fields with the largest mass stay, and specimens of the problem come first.
+    The fields with the largest mass stay, and specimens of the
+    problem come first.
 
     >>> from types import SimpleNamespace
     >>> from stiction.inference.specimens import Onsets, Profiles
@@ -466,8 +468,8 @@ def _widths(
 ) -> xr.Dataset:  # fmt: skip
     """Return widths of intervals and design stresses after further measurements.
 
-    Without further measurements, the first design describes the present posterior. (Predictions
-    are replaced by numbers here.)
+    Without further measurements, the first design describes the
+    present posterior. (Predictions are replaced by numbers here.)
 
     >>> from types import SimpleNamespace
     >>> from unittest.mock import patch
@@ -544,8 +546,9 @@ def _after(
 ) -> tuple[FactorGrid, Tables]:
     """Return the posterior after further tests and profiles for a true draw (1, 4) (steps 6, 7).
 
-    The true field is the first, with the mean 1.5 times the reference and almost no scatter.
-    A further level has the mean variance of the present levels within each field.
+    The true field is the first, with the mean 1.5 times the
+    reference and almost no scatter. A further level has the mean
+    variance of the present levels within each field.
 
     >>> from unittest.mock import patch
     >>> from stiction.inference.specimens import Onsets, Profiles
@@ -568,8 +571,9 @@ def _after(
     >>> [(peaks / 1e5).round(3).tolist() for peaks in both.peaks]
     [[7.0, 12.0, 12.0], [6.0]]
 
-    In the second field, logarithms have the variance 0.06, and levels keep their mean. A factor
-    adds the variance log(1 + 0.3^2).
+    In the second field, logarithms have the variance 0.06, and
+    levels keep their mean. A factor adds the variance log(1 +
+    0.3^2).
 
     >>> truth[:] = 1.0, 0.0, 1e-6, math.log(1.5)
     >>> levels = after(truth, 20_000)[1].profiles.levels[2:] / 3e6

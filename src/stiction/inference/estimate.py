@@ -167,8 +167,8 @@ class BestFit:
     def simulate(self, rng: np.random.Generator) -> list[Array]:
         """Simulate the measured values (points,) of each record, with noise.
 
-        The field hardly varies. Records show the noise, whose variance is 0.25*4, and then the
-        factor between specimens.
+        The field hardly varies. Records show the noise, whose
+        variance is 0.25*4, and then the factor between specimens.
 
         >>> from stiction.inference.marginal_fit import family_of
         >>> from stiction.random.marginals import Lognormal
@@ -205,7 +205,8 @@ class BestFit:
     def of_means(self) -> Array:
         """Variance that the field alone causes in the mean of each record.
 
-        The mean of n values without correlation has the variance of a value over n.
+        The mean of n values without correlation has the variance of
+        a value over n.
 
         >>> from types import SimpleNamespace
         >>> def white(window):
@@ -233,7 +234,8 @@ class BestFit:
     def chance_of_scatter(self, levels: Array) -> float:
         """Return the probability that means of records from one field scatter as much (step 7).
 
-        Two means, 1 away from their mean on either side, have Q = 2/v.
+        Two means, 1 away from their mean on either side, have Q =
+        2/v.
 
         >>> from types import SimpleNamespace
         >>> fit = SimpleNamespace(of_means=np.array([0.5, 0.5]))
@@ -247,8 +249,9 @@ class BestFit:
     def independent(self) -> float:
         """Number of independent values that distinguish families equally well (step 5).
 
-        Two records have 4 points, one has 6. If correlations are 1, the sum of their cubes is
-        2*16 + 36. If half of the variance is noise, they are 1/2 between different points.
+        Two records have 4 points, one has 6. If correlations are 1,
+        the sum of their cubes is 2*16 + 36. If half of the variance
+        is noise, they are 1/2 between different points.
 
         >>> from types import SimpleNamespace
         >>> first, second = (RecordWindow((1.0,), np.ones(n, dtype=np.bool_)) for n in (4, 6))
@@ -276,7 +279,8 @@ class BestFit:
     def lengths_held(self) -> float:
         """Number of correlation lengths (on planes, correlation areas) in all records together.
 
-        Lines with 4 and 5 measured points, and a map with 5 of 6 points:
+        Lines with 4 and 5 measured points, and a map with 5 of 6
+        points:
 
         >>> from types import SimpleNamespace
         >>> def held(spacings, *measured):
@@ -318,8 +322,9 @@ def estimate(
 
     Examples
     --------
-    Records of different specimens are first scaled to equal means, and then twice by means of
-    the last fit (`_estimate` is replaced here).
+    Records of different specimens are first scaled to equal means,
+    and then twice by means of the last fit (`_estimate` is replaced
+    here).
 
     >>> from types import SimpleNamespace
     >>> from unittest.mock import patch
@@ -370,7 +375,8 @@ def estimate(
 def _estimate(rows: Sequence[Array], setting: FitSetting, start: BestFit | None) -> BestFit:
     """Fit records from one field (steps 1 to 3).
 
-    Ten records of 64 points are simulated with noise. The fit finds their parameters roughly.
+    Ten records of 64 points are simulated with noise. The fit finds
+    their parameters roughly.
 
     >>> from stiction.inference.marginal_fit import family_of
     >>> from stiction.random.marginals import Lognormal
@@ -396,7 +402,8 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: BestFit | None)
     >>> max(abs(math.log(again[name] / fit.parameters[name])) for name in names) < 0.01
     True
 
-    The Kolmogorov distance and the roughness compare the data with the model.
+    The Kolmogorov distance and the roughness compare the data with
+    the model.
 
     >>> from scipy.stats import kstest
     >>> quiet = setting.marginal.quiet(np.concatenate(rows), fit.model.noise)
@@ -407,8 +414,9 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: BestFit | None)
     >>> f"{np.mean(np.log(measured / expected) ** 2) / fit.roughness:.6f}"
     '1.000000'
 
-    Without noise, the estimated variance may be negative by chance. The noise is then zero. If
-    the noise is known, its variance is not estimated.
+    Without noise, the estimated variance may be negative by chance.
+    The noise is then zero. If the noise is known, its variance is
+    not estimated.
 
     >>> rows = truth(1e-20).simulate(np.random.default_rng(4))
     >>> fit = _estimate(rows, setting, None)
@@ -467,8 +475,9 @@ def _left(windows: Sequence[RecordWindow], model: Model) -> float:
     projection M removes the trend of each record, and the mean of all
     records, from the values.
 
-    Values without correlation lose one of N for the mean of all, and one for the trend of each
-    record. A single record that is correlated throughout loses all, and the least part is left.
+    Values without correlation lose one of N for the mean of all,
+    and one for the trend of each record. A single record that is
+    correlated throughout loses all, and the least part is left.
 
     >>> from types import SimpleNamespace
     >>> first, second = (RecordWindow((1.0,), np.ones(n, dtype=np.bool_), 1) for n in (4, 6))
@@ -495,7 +504,8 @@ def bands(group: Observed, expected: Array) -> Array:
 
     Examples
     --------
-    The wavenumbers 4 and 4.1 are in one band. The point with weight 0 is left out.
+    The wavenumbers 4 and 4.1 are in one band. The point with weight
+    0 is left out.
 
     >>> from types import SimpleNamespace
     >>> window = SimpleNamespace(
@@ -545,7 +555,8 @@ def windowed(
 
     Examples
     --------
-    A straight line less its trend is its mean. The records 0 and 1 have the same geometry.
+    A straight line less its trend is its mean. The records 0 and 1
+    have the same geometry.
 
     >>> line, spacing = np.array([1.0, 3.0, 5.0, 7.0]), (0.5,)
     >>> missing = np.array([1.0, 3.0, np.nan, 7.0])
@@ -578,8 +589,9 @@ def ranking(
 
     Examples
     --------
-    Three families have 2, 1 and 2 parameters. The likeliest family, 'a', has 20 independent
-    values, so the scores are -20 - 2, -24 - 1 and -30 - 2. (Fits are replaced by numbers here.)
+    Three families have 2, 1 and 2 parameters. The likeliest family,
+    'a', has 20 independent values, so the scores are -20 - 2, -24 -
+    1 and -30 - 2. (Fits are replaced by numbers here.)
 
     >>> from types import SimpleNamespace
     >>> from unittest.mock import patch
@@ -673,8 +685,9 @@ def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
 
     Examples
     --------
-    Without a variance by the field, all records get the mean 5. With variances, the logarithms
-    of the levels get Q(0) = n - 1, and the mean of the levels stays.
+    Without a variance by the field, all records get the mean 5.
+    With variances, the logarithms of the levels get Q(0) = n - 1,
+    and the mean of the levels stays.
 
     >>> rows = [np.array([1.0, 3.0]), np.array([8.0])]
     >>> [row.round(6).tolist() for row in as_of_one(rows, np.zeros(2))]
@@ -719,7 +732,8 @@ def scatter_between(logarithms: Array, within: Array) -> float:
 
     Examples
     --------
-    With equal variances v, the estimate is the variance of the logarithms, 0.13, less v.
+    With equal variances v, the estimate is the variance of the
+    logarithms, 0.13, less v.
 
     >>> logarithms = np.array([0.0, 0.7, 0.2])
     >>> cv = scatter_between(logarithms, np.full(3, 0.05))

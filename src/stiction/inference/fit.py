@@ -300,8 +300,9 @@ class FieldFit(WithFactors, Result):
     def _chosen(self, count: int, seed: int) -> list[RandomField]:
         """Return likely fields from all families in proportion to their weights (step 6).
 
-        Family 'a' has two fields and three quarters of the weight. Family 'b' has one field.
-        Family 'z' has no weight and no field.
+        Family 'a' has two fields and three quarters of the weight.
+        Family 'b' has one field. Family 'z' has no weight and no
+        field.
 
         >>> from types import SimpleNamespace
         >>> weights = {"a": 0.3, "z": 0.0, "b": 0.1}
@@ -357,8 +358,9 @@ class FieldFit(WithFactors, Result):
     def _with_levels(self, fields: Sequence[RandomField]) -> Profiles:
         """Return the fields, the record levels, and the variance of each level by each field.
 
-        The second field has twice the coefficient of variation and twice the length. Its levels
-        have 8 times the variance, but at most the variance of the field.
+        The second field has twice the coefficient of variation and
+        twice the length. Its levels have 8 times the variance, but
+        at most the variance of the field.
 
         >>> import stiction as st
         >>> from types import SimpleNamespace
@@ -379,7 +381,8 @@ class FieldFit(WithFactors, Result):
         >>> [round(one.strength.mean, 6) for one in profiles.fields]
         [2.0, 2.0]
 
-        Without `between`, the weighted mean is the level of a single specimen.
+        Without `between`, the weighted mean is the level of a
+        single specimen.
 
         >>> fit._families = ()
         >>> profiles = FieldFit._with_levels(fit, fields)
@@ -414,7 +417,8 @@ class FieldFit(WithFactors, Result):
         return Profiles(members, mean, levels, within, families)
 
     def _summary(self) -> Summary:
-        """Return the summary: parameters with intervals, scores, p-values and doubts.
+        """Return the summary: parameters with intervals, scores,
+        p-values and doubts.
 
         >>> import stiction as st
         >>> from types import SimpleNamespace
@@ -613,8 +617,9 @@ def _refitted(
 ) -> tuple[dict[str, Goodness], list[Refits], list[Refits]]:
     """Return the families, and repetitions of the best and of others (steps 2 and 3).
 
-    The repetitions of other families are in proportion to their weights, but at least 20. Fits
-    are replaced here, and the family 'b' cannot be repeated.
+    The repetitions of other families are in proportion to their
+    weights, but at least 20. Fits are replaced here, and the family
+    'b' cannot be repeated.
 
     >>> from types import SimpleNamespace
     >>> from unittest.mock import patch
@@ -668,8 +673,8 @@ def _judged(
 
     Each field has `count` repetitions.
 
-    Records of one field: `count` repetitions are wanted for each of the fields. (The intervals
-    are replaced here.)
+    Records of one field: `count` repetitions are wanted for each of
+    the fields. (The intervals are replaced here.)
 
     >>> from types import SimpleNamespace
     >>> from unittest.mock import patch
@@ -699,7 +704,8 @@ def _judged(
     >>> "level" in judged(np.array([3.0]))["p_values"], judged(np.ones(2), 2)["doubts"]
     (False, ('doubt',))
 
-    Records of specimens: the mean and the scatter follow from the posterior of the levels.
+    Records of specimens: the mean and the scatter follow from the
+    posterior of the levels.
 
     >>> setting.between = True
     >>> found = judged(np.array([1.8, 2.3]), 2)
@@ -762,8 +768,9 @@ def _judged(
 def _p_value(name: str, truth: BestFit, fits: Sequence[BestFit]) -> float:
     """Return the p-value of a distance of the data, given the distances of repetitions (step 5).
 
-    The logarithms 0, 2 and 4 of the repetitions have the standard deviation 2. Student's
-    distribution with 2 degrees of freedom has 1/2 - t/(2 (2 + t^2)^(1/2)) above t.
+    The logarithms 0, 2 and 4 of the repetitions have the standard
+    deviation 2. Student's distribution with 2 degrees of freedom
+    has 1/2 - t/(2 (2 + t^2)^(1/2)) above t.
 
     >>> from types import SimpleNamespace
     >>> fits = [SimpleNamespace(distance=math.exp(k)) for k in (0, 2, 4)]
@@ -803,8 +810,8 @@ def _doubts(fitted: BestFit, p_values: Mapping[str, float]) -> list[str]:
     >>> doubts(ends=[("exponent", 16.0)])
     ['exponent 16 lies at an end of the searched range']
 
-    The power at the cut-off is 2*4 times the fraction of the field, and the noise has the
-    variance 2 times its fraction.
+    The power at the cut-off is 2*4 times the fraction of the field,
+    and the noise has the variance 2 times its fraction.
 
     >>> doubts(noise_share=0.75), doubts(noise_share=0.85)
     ([], ['the noise (1.3) hides the cut-off of the spectrum'])
@@ -837,8 +844,8 @@ def _doubts(fitted: BestFit, p_values: Mapping[str, float]) -> list[str]:
 def _power_at_cutoff(fitted: BestFit, window: RecordWindow) -> float:
     """Return the power of the field, relative to white noise, where it has fallen to a quarter.
 
-    The power is 2*0.75 times the signal, without the mean. It is at least a quarter of 12 at
-    two wavenumbers, or at three.
+    The power is 2*0.75 times the signal, without the mean. It is at
+    least a quarter of 12 at two wavenumbers, or at three.
 
     >>> from types import SimpleNamespace
     >>> window = SimpleNamespace(weights=np.array([0.0, 0.5, 1.0, 1.0]))

@@ -290,7 +290,8 @@ def _of_parameters(
 def _grown(box: Array, u: Array | None) -> Array:
     """Return the box, widened at the ends that draws (draws, parameters) reach (step 5).
 
-    A box grows by its width at the ends that more than 0.1 % of the draws reach.
+    A box grows by its width at the ends that more than 0.1 % of the
+    draws reach.
 
     >>> box = np.array([[0.4, 0.3], [0.6, 0.35]])
     >>> u = np.full((2000, 2), [0.5, 0.32])
@@ -314,8 +315,9 @@ def _grown(box: Array, u: Array | None) -> Array:
 def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
     """Return notes on the limitations of a posterior with draws u (draws, parameters).
 
-    A posterior in the middle of the prior, with a small error, gives no notes. More than 8 % of
-    the draws in the last 2 % of a prior do.
+    A posterior in the middle of the prior, with a small error,
+    gives no notes. More than 8 % of the draws in the last 2 % of a
+    prior do.
 
     >>> import stiction as st
     >>> from types import SimpleNamespace
@@ -371,8 +373,9 @@ def _of_specimens(
 ) -> SpecimenPosterior:
     """Return the posterior of mean and scatter between specimens, from profiles and peaks.
 
-    The grid of a single field has four cells of s and two of the mean. Simulations, the grid
-    and the comparison are replaced here.
+    The grid of a single field has four cells of s and two of the
+    mean. Simulations, the grid and the comparison are replaced
+    here.
 
     >>> from types import SimpleNamespace
     >>> from unittest.mock import patch
@@ -526,7 +529,8 @@ def _specimen_notes(grid: FactorGrid, comparison: Agreement | None) -> list[str]
     ...     grid = SimpleNamespace(profiles=profiles, mass=np.reshape(shares, (1, 1, -1, 1)))
     ...     return [note.split(",")[0] for note in _specimen_notes(grid, comparison)]
 
-    Half of the range is ln 2 = 0.69 nats. Four fifths are ln 5/4 nats, less than ln 4/3.
+    Half of the range is ln 2 = 0.69 nats. Four fifths are ln 5/4
+    nats, less than ln 4/3.
 
     >>> notes([0.5, 0.5, 0, 0], 2)
     []
