@@ -230,7 +230,63 @@ def infer(
 def _of_parameters(
     prior: Prior, simulation: Simulation, measured: Peaks, error: float
 ) -> Posterior:
-    """Return the posterior for the parameters in a prior (steps 2 to 5)."""
+    """Return the posterior for the parameters in a prior (steps 2 to 5).
+
+    One parameter x = 10 u has a normal likelihood, and the simulation is
+    replaced. The local criterion finds u = 0.3, and the method 0.45, so the
+    box of the local criterion must grow.
+
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import patch
+    >>> class Normal(SimpleNamespace):
+    ...     def of(self, peaks):
+    ...         return self
+    ...     def __call__(self, u):
+    ...         return self.top - 0.5 * ((u[:, 0] - self.at) / 0.01) ** 2
+    ...     def refusals(self):
+    ...         return self.refused
+    >>> prior = SimpleNamespace(
+    ...     names=("x",), middle=None, at=lambda u: (None, None), theta=lambda u: 10.0 * u,
+    ...     ends=np.array([[0.0, 10.0]]), whole=np.array([[0.0], [1.0]]))
+    >>> peaks = Peaks((0.1, 0.2), (np.ones(2), np.ones(3)), "Pa")
+    >>> def posterior(guided, top=0.0, refused=(), far=()):
+    ...     boxes = []
+    ...     def likelihood(prior, simulation, box, **given):
+    ...         boxes.append(box.ravel().tolist())
+    ...         local = isinstance(simulation.method, LocalCriterion)
+    ...         return Normal(at=0.3 if local else 0.45, samples=500, top=top, refused=refused)
+    ...     changed = {
+    ...         "variable_of": lambda *_: "critical_stress", "doubt_strengths": lambda *_: None,
+    ...         "mean_in_stress": lambda *_: None, "experiments_at": lambda *_: [None, None],
+    ...         "bounds_of": lambda *_: (0.0, 1.0), "out_of_reach": lambda *_: [*far],
+    ...         "is_guided": lambda *_: guided, "make_likelihood": likelihood,
+    ...         "_notes": lambda *_: []}
+    ...     with patch.multiple("stiction.inference.infer", **changed):
+    ...         setting = Simulation(Equilibrium(), None, 0)
+    ...         return _of_parameters(prior, setting, peaks, 0.0), boxes
+    >>> for guided in (False, True):
+    ...     found, boxes = posterior(guided)
+    ...     evidence = math.log(0.01 * math.sqrt(2.0 * math.pi))
+    ...     print(f"{found.mean['x']:.2f} {found.log_evidence / evidence:.3f}",
+    ...           f"{found.information['x'] / (-evidence - 0.5):.3f}", found.monte_carlo_error)
+    4.50 1.000 1.000 0.1
+    4.50 1.000 1.000 0.1
+    >>> boxes[0], boxes[1][1] < 0.45 < boxes[-1][1] < 1.0, len(boxes) > 2
+    ([0.0, 1.0], True, True)
+    >>> posterior(False, refused=["peak 9 is out of reach"])
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: peak 9 is out of reach
+    >>> posterior(True, top=-math.inf)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: peaks: no parameters within ...
+    >>> posterior(False, far=["far"])
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: far
+    far
+    """
     tested, middle = prior.at(prior.middle)
     variable = variable_of(tested, middle, measured.unit)
     doubt_strengths(tested, mean_in_stress(tested, middle, "strength"))
