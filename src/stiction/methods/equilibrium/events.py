@@ -226,20 +226,20 @@ def patch_measures(problem: Problem, before: Any, added: Array, drop: Array) -> 
     `before` is the state before the event.
 
     The nodes are 0.1 m apart. Node 6 slipped too little to belong to the
-    patch, which lies across the border of a circle:
+    patch, which lies across the border of a circle, and node 2 went back:
 
     >>> from types import SimpleNamespace
     >>> solid = SimpleNamespace(shear_modulus=5.0)
     >>> problem = SimpleNamespace(interface=Interface(0.8, 8), solid=solid)
     >>> before = SimpleNamespace(direction=np.array([0, 0.2, 0, 0, 0, 0, 0, 0.1]))
-    >>> added, drop = np.array([4.0, 1, 0, 0, 0, 0, 0.003, 3.0]), np.arange(1.0, 9.0)
+    >>> added, drop = np.array([4.0, 1, -0.8, 0, 0, 0, 0.002, 3.0]), np.arange(1.0, 9.0)
     >>> found = patch_measures(problem, before, added, drop)
     >>> names = "position", "length", "start", "end", "hypocentre", "mean_slip"
     >>> print(*(np.round(found[f"event_{name}"], 6) for name in names))
     [0.775] 0.3 [0.65] [0.15] [0.1] 2.666667
     >>> names = "largest_slip", "area_stress_drop", "slip_stress_drop", "moment", "magnitude"
     >>> print(*(round(float(found[f"event_{name}"]), 3) for name in names))
-    4.0 3.667 3.751 4.002 -5.665
+    4.0 3.667 3.834 3.601 -5.696
     >>> before.direction = np.zeros(8)
     >>> patch_measures(problem, before, added, drop)["event_hypocentre"]
     (nan,)
@@ -300,7 +300,8 @@ def _measures(problem: Problem, rows: Sample, row: int, event: ArrestedEvent) ->
     ... )
     >>> slip = np.full(8, 0.1)
     >>> added = 0.2 * (1.0 + np.cos(np.arange(8) * np.pi / 4))
-    >>> event = ArrestedEvent(*(EquilibriumState(3.0, d, added) for d in (slip, slip + added)))
+    >>> before = EquilibriumState(3.0, slip, added)
+    >>> event = ArrestedEvent(before, EquilibriumState(3.2, slip + added, added))
     >>> found = _measures(problem, rows, 1, event)
     >>> names = "stress", "area_stress_drop", "slip_stress_drop", "energy_stress_drop"
     >>> print(*(round(float(found[f"event_{name}"]), 6) for name in names))
@@ -330,7 +331,7 @@ def _measures(problem: Problem, rows: Sample, row: int, event: ArrestedEvent) ->
     >>> found = _measures(problem, rows, 1, event)
     >>> names = "stress", "stress_drop", "travel", "crosshead_travel", "travel_step"
     >>> print(*(round(float(found[f"event_{name}"]), 6) for name in names))
-    6.1 0.8 0.37 0.69 0.14
+    6.1 0.4 0.37 0.69 0.16
     """
     (before, after, known), interface, law = event, problem.interface, problem.friction
     means = (rows.initial_stress[row], rows.load_profile)

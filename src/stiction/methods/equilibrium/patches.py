@@ -215,6 +215,15 @@ def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
     >>> patch = patch_of(mask, weight, (0.5, 0.1))
     >>> np.round([*patch.centre, *patch.extents, patch.area, *patch.starts], 6).tolist()
     [1.9375, 0.1625, 1.0, 0.3, 0.2, 1.25, 0.05]
+
+    A patch along the whole circle is cut opposite its own peak, in row 3:
+
+    >>> mask = np.arange(24).reshape(4, 6) % 6 == 2
+    >>> weight = np.where(mask, 1.0, 9.0)
+    >>> weight[3, 2] = 2.0
+    >>> patch = patch_of(mask, weight, (0.5, 0.1))
+    >>> np.round([patch.centre[0], patch.extents[0], patch.starts[0]], 6).tolist()
+    [1.3, 2.0, 0.25]
     """
     peak = np.unravel_index(int(np.argmax(np.where(mask, weight, -np.inf))), mask.shape)
     centre, extents, starts = [], [], []

@@ -178,6 +178,9 @@ def follow_to_sliding(
     >>> follow(ends, [state(3.0), state(4.0), stable], [arrested, arrested])
     3.0 4.0 6.0 1
     True None True [False, False]
+    >>> follow(ends, [state(3.0), state(6.0, PathStatus.GIVEN_UP)], [arrested])
+    3.0 6.0 6.0 1
+    False None False [False]
     """
     ends, sliding = not np.isfinite(sample.excess).all(), None
     first: EquilibriumState | None = None
@@ -379,6 +382,13 @@ class OnsetSolver:
         >>> values["slip"].tolist() == slip.tolist()
         True
 
+        If the last state does not move, the first patch slides:
+
+        >>> still = EquilibriumState(5.0, slip, 0.0 * slip)
+        >>> values = solver._values(rows, 1, sample, path._replace(last=still))
+        >>> round(values["sliding_position"], 6)
+        0.25
+
         Without an instability, the values of the instability are NaN, and if
         the interface ends between half-spaces, the values of sliding as well:
 
@@ -390,6 +400,10 @@ class OnsetSolver:
         ...     print(*(name for name in sorted(values) if np.isnan(np.sum(values[name]))))
         critical_patch_length critical_position first_instability
         critical_load critical_patch_length critical_position critical_stress first_instability
+        >>> problem.specimen = "blocks"
+        >>> values = solver._values(rows, 1, sample, path)
+        >>> round(values["critical_load"], 6)
+        3.0
         """
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
