@@ -411,7 +411,7 @@ def moves_of(design: Answer) -> list[tuple[str, str, str, str, str]]:
     A distribution between specimens has a single design.
 
     >>> from types import SimpleNamespace
-    >>> columns = {"low": ["0.6", "none"], "high": ["0.8", "as stated"]}
+    >>> columns = {"low": ["0.6", "absent"], "high": ["0.8", "as stated"]}
     >>> columns |= {"stress_at_low": [10.0, 15.0], "stress_at_high": [20.0, 12.0]}
     >>> effects = xr.Dataset({name: ("source", values) for name, values in columns.items()})
     >>> effects = effects.assign_coords(source=["ratio", "field"])
@@ -420,7 +420,7 @@ def moves_of(design: Answer) -> list[tuple[str, str, str, str, str]]:
     >>> for row in moves_of(design):
     ...     print(row)
     ('ratio', '0.6', '0.8', '30 N', '60 N')
-    ('field', 'none', 'as stated', '45 N', '36 N')
+    ('field', 'absent', 'as stated', '45 N', '36 N')
     ('scatter of specimens', 'normal', '', '21 N', '')
     >>> design.sensitivities = xr.Dataset()
     >>> moves_of(design)
@@ -444,7 +444,7 @@ def moves_of(design: Answer) -> list[tuple[str, str, str, str, str]]:
 def unseen_batch(specimens: int) -> list[str]:
     """Return a sentence on the weak batch that some specimens cannot exclude (95 %).
 
-    If a quarter of all specimens were weak, 10 specimens would show none
+    If a quarter of all specimens were weak, 10 specimens would miss them
     with a probability of 0.75^10 = 0.056.
 
     >>> unseen_batch(10)

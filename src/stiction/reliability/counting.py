@@ -527,9 +527,9 @@ def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts | Non
     ...     experiment = {"seed": 0, "random": random, "problem": problem, "method": None}
     ...     state.experiment = SimpleNamespace(**experiment)
     ...     counts, enough = count_tail(state, goal, budget)
-    ...     return counts and len(counts), enough
+    ...     return len(counts or ()), enough
     >>> count(Goal(0.07, 0.305)), count(Goal(0.05, 0.305)), count(Goal(0.07, 0.305), members=100)
-    ((500, True), (1000, True), (None, False))
+    ((500, True), (1000, True), (0, False))
     >>> count(Goal(0.07, 0.305), budget=200), count(Goal(0.05, 0.305), budget=800)
     ((200, True), (500, False))
     >>> count(Goal(0.063, 0.305), budget=700)  # 620 are wanted, in steps of 500 at least
