@@ -285,6 +285,33 @@ class Rupture(Listed):
     def _summary_of(
         self, run: Run, state: RuptureState | None, rows: Sample, row: int
     ) -> dict[str, Any]:
+        """The parts of the run are replaced here. A run that begins at rest, a run
+        from an equilibrium, and a run without slip, which has only its end:
+
+        >>> from types import FunctionType, SimpleNamespace
+        >>> def summarised(first, state=None, ending="sliding", **options):
+        ...     names = globals() | {"checks": SimpleNamespace(at_first_slip=lambda run: first)}
+        ...     names["checks"].check_finite = names["checks"].warn_of_slip = lambda *given: None
+        ...     values = {"kinetic_stress": 3.0}
+        ...     names["summary"] = lambda run, state: {"critical_stress": state} | values
+        ...     names["event_table"] = lambda *given: {"event_load": given[-1]}
+        ...     for name in ("arrested_events", "event_variables"):
+        ...         names[name] = lambda *given, **named: []
+        ...     load = SimpleNamespace(at=np.array([0.0, 4.0]))
+        ...     setting = SimpleNamespace(load=load, thresholds=SimpleNamespace(end_time=2.5))
+        ...     problem = SimpleNamespace(interface=None)
+        ...     run = SimpleNamespace(setting=setting, medium=SimpleNamespace(problem=problem))
+        ...     run.start, run.cut_event = lambda time: f"start at {time}", lambda state: None
+        ...     run.run_to_end = lambda state, most: (ending, 0)
+        ...     plain = FunctionType(Rupture._summary_of.__code__, names)
+        ...     return plain(Rupture(**options), run, state, None, 0)
+        >>> summarised("rest"), summarised("rest", "equilibrium")["critical_stress"]
+        ({'critical_stress': 'rest', 'kinetic_stress': 3.0}, 'equilibrium')
+        >>> summarised(None, "equilibrium", events=2)
+        {'critical_stress': 'start at 2.5', 'kinetic_stress': 3.0, 'event_load': 2}
+        >>> summarised("rest", stop="onset")["kinetic_stress"].tolist()
+        nan
+        """
         rest = checks.at_first_slip(run)
         if rest is None:  # no node slips: the result is the state at rest at the end
             state = run.start(min(run.setting.load.at[-1], run.setting.thresholds.end_time))

@@ -189,10 +189,10 @@ class Save(Listed):
         >>> Save(["slip"], stations={"a": (0.34, 0.12)}).nodes(plane).tolist()  # 3 * 8 + 2
         [26]
         >>> with collect_warnings() as warned:
-        ...     nodes = Save(["slip"], stations={"a": 0.049, "b": 0.051}).nodes(line)
+        ...     nodes = Save(["slip"], stations={"a": 0.049, "b": 0.051, "d": 0.0}).nodes(line)
         ...     _ = Save(["slip"], stations={"c": 0.6}).nodes(Interface(0.8, 8, extent=(0.1, 0.5)))
         >>> nodes.tolist(), [str(warning)[:32] for warning in warned]
-        ([0, 1], ["stations['a']: (0.049,) is neare", "stations['c']: (0.6,) lies beyon"])
+        ([0, 1, 0], ["stations['a']: (0.049,) is neare", "stations['c']: (0.6,) lies beyon"])
         """
         lengths, numbers = interface.lengths, []
         for name, place in self.stations.items():
@@ -302,7 +302,34 @@ class Recorder:
         self._frames.append(frame)
 
     def take(self) -> xr.Dataset:
-        """Return the data since the last call as a dataset."""
+        """Return the data since the last call as a dataset.
+
+        Two frames and three steps, out of two groups, become a dataset. Then the
+        record is empty.
+
+        >>> from types import SimpleNamespace
+        >>> import stiction as st
+        >>> problem = st.paper.problem(nodes=256)
+        >>> medium = SimpleNamespace(problem=problem, interface=problem.interface)
+        >>> run = SimpleNamespace(medium=medium, setting=SimpleNamespace(stations=np.array([3, 5])))
+        >>> save = Save(["slip"], stations={"a": 0.001, "b": 0.002})
+        >>> recorder = Recorder(run, save, {"stopped": "rest"})
+        >>> frame = dict.fromkeys(SCALARS, 2.0) | {"slip": np.full(256, 0.5)}
+        >>> recorder._frames = [frame | {"time": time} for time in (1.0, 4.0)]
+        >>> for count in (1, 2):
+        ...     group = {name: np.full(count, 1.0 * count) for name in STEPS}
+        ...     group |= {name: np.full((count, 2), 7.0) for name in STATIONS}
+        ...     recorder._steps.append(group)
+        >>> data = recorder.take()
+        >>> dict(data.sizes), data.time.values.tolist(), data.step_load.values.tolist()
+        ({'time': 2, 'x': 256, 'step': 3, 'station': 2}, [1.0, 4.0], [1.0, 2.0, 2.0])
+        >>> data.station_x.values.round(9).tolist(), data.station_slip.shape, data.attrs["stopped"]
+        ([0.001171875, 0.001953125], (3, 2), 'rest')
+        >>> (data.moment_rate / (1e9 * 0.1)).values.round(9).tolist()  # G times the length
+        [1.0, 2.0, 2.0]
+        >>> dict(recorder.take().sizes)["time"]
+        0
+        """
         interface, save = self.run.medium.interface, self.save
         names = ("time", *SCALARS, *save.fields)
         data = {name: np.array([frame[name] for frame in self._frames]) for name in names}
@@ -439,7 +466,25 @@ def _write(path: Path, dataset: xr.Dataset) -> None:
 
 
 def _digest(run: Run, saved: str) -> str:
-    """Return the SHA-256 of all that a run depends on besides its state."""
+    """Return the SHA-256 of all that a run depends on besides its state.
+
+    Every input changes the digest.
+
+    >>> from types import SimpleNamespace
+    >>> def digest(saved="", peak=1.0, law=2.0, load=3.0, end_time=4.0, **others):
+    ...     grid, step, length = (others.get(name, 5.0) for name in ("grid", "step", "length"))
+    ...     friction = SimpleNamespace(fraction=lambda slips: np.exp(-law * slips))
+    ...     medium = SimpleNamespace(grid=("transform", grid), interface=Interface(length, 8))
+    ...     medium.step = step
+    ...     medium.problem, times = SimpleNamespace(friction=friction), np.array([0.0, 1.0])
+    ...     setting = SimpleNamespace(nodes=[np.array([peak])], load=[times, load * times], law=[])
+    ...     setting.thresholds = [True, end_time]
+    ...     return _digest(SimpleNamespace(medium=medium, setting=setting), saved)
+    >>> names = "peak", "law", "load", "end_time", "grid", "step", "length"
+    >>> digests = [digest(), digest(saved="a"), *(digest(**{name: 7.0}) for name in names)]
+    >>> digest() == digests[0], len(set(digests)), len(digests[0])
+    (True, 9, 64)
+    """
     medium, setting = run.medium, run.setting
     numbers = medium.grid[1:]  # all but the transform, which follows from the interface
     # A law of others has no text that identifies it, so compare its values.
@@ -455,7 +500,30 @@ def _digest(run: Run, saved: str) -> str:
 
 
 def write_checkpoint(path: Path, run: Run, state: RuptureState, saved: str = "") -> None:
-    """Write the state of a run and its digest, in a single operation."""
+    """Write the state of a run and its digest, in a single operation.
+
+    The state and the events of a run are read again, but not for another run.
+
+    >>> import tempfile
+    >>> from types import FunctionType, SimpleNamespace
+    >>> names = globals() | {"_digest": lambda run, saved: f"digest of {saved}"}
+    >>> functions = write_checkpoint, read_checkpoint
+    >>> write, read = (FunctionType(of.__code__, names, None, of.__defaults__) for of in functions)
+    >>> state = RuptureState(*np.arange(20.0).reshape(10, 2), np.zeros(1, DIAGNOSTICS))
+    >>> run, path = SimpleNamespace(events=[]), Path(tempfile.mkdtemp()) / "checkpoint.npz"
+    >>> run.events.append(np.zeros((), event_type(2)))
+    >>> state.now["step"]["time"], run.events[0]["time"] = 3.0, 5.0
+    >>> write(path, run, state, "this")
+    >>> empty, other = RuptureState(*np.zeros((10, 2)), np.zeros(1, DIAGNOSTICS)), SimpleNamespace()
+    >>> read(path, other, empty, "this") is empty, empty.memory.tolist(), empty.event_slip.tolist()
+    (True, [10.0, 11.0], [18.0, 19.0])
+    >>> float(empty.now["step"]["time"]), [float(event["time"]) for event in other.events]
+    (3.0, [5.0])
+    >>> read(path, other, empty, "that")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: to: ... holds another run: ...
+    """
     digest = np.frombuffer(_digest(run, saved).encode(), np.uint8)
     events = np.array(run.events, event_type(state.slip.size))
     write_arrays(path, {"digest": digest, "events": events} | state._asdict())

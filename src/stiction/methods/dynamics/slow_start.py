@@ -170,6 +170,64 @@ def _state_at(
     The state is unknown if a node is beyond the first piece of its law,
     where the linear programme does not hold, or if a front has arrived,
     since the time of arrival is not known.
+
+    At 8 Pa below the onset of 100 Pa, and at 2 Pa less, the slips differ by 0.1
+    and 0.05 m. The load takes 1 s from one to the other at 2 Pa/s. The growth is
+    2/(2 * 8) per second, so the rates are 1 + 0.125/2 times their means.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> from stiction.methods.dynamics.state import DIAGNOSTICS
+    >>> from stiction.problem.interface import Interface
+    >>> names = globals() | {"exceeds": lambda static, slip: False}
+    >>> names["energy_balance"] = lambda run, state: {"radiated_energy": 4.0}
+    >>> names["grown_memory"] = lambda grid, memory, V, growth: growth * np.eye(1, 5)[0]
+    >>> plain, line = FunctionType(_state_at.__code__, names), Interface(0.8, 8)
+    >>> def solve(static, cap):
+    ...     return SimpleNamespace(slip=slips[cap]) if cap in slips else None
+    >>> slips = {92.0: np.append([0.5, 0.25], np.zeros(6))}
+    >>> slips[90.0] = np.append([0.4, 0.2], np.zeros(6))
+    >>> nodes = SimpleNamespace(residual_slip=np.append([1.2, 0.8], np.full(6, 9.0)))
+    >>> setting = SimpleNamespace(nodes=nodes, mean_profile=2.0)
+    >>> setting.thresholds = SimpleNamespace(front_share=0.5)
+    >>> grid = SimpleNamespace(stiffness=np.full((2, 5), 16.0))
+    >>> run = SimpleNamespace(setting=setting, slope=lambda time: 2.0)
+    >>> run.medium = SimpleNamespace(grid=grid, impedance=3.0, interface=line)
+    >>> def start(time, slip):
+    ...     fields = (slip.copy(), *np.zeros((2, 8)), np.zeros(5, complex), *np.zeros((6, 8)))
+    ...     state = RuptureState(*fields, np.zeros(1, DIAGNOSTICS))
+    ...     state.now["step"]["time"], state.now["step"]["work"] = time, 9.0
+    ...     return state
+    >>> run.start, run.elastic_stress = start, lambda slip_hat, load: np.full(8, load)
+    >>> run.strength_after = lambda slip: np.full(8, 90.0)
+    >>> state = plain(SimpleNamespace(solve=solve), run, None, 100.0, 8.0)
+    >>> state.slip_rate[:3].round(9).tolist(), state.past[:3].round(9).tolist()
+    ([0.10625, 0.053125, 0.0], [0.1, 0.05, 0.0])
+    >>> now, radiated = state.now, 3.0 * (0.10625 + 0.053125) / 8.0
+    >>> load = 92.0 + radiated / 2.0
+    >>> stress = load + 0.125 * 16.0 / 8.0 - 3.0 * state.slip_rate
+    >>> np.allclose(state.stress, stress), np.allclose(now["step"]["time"], load / 2.0)
+    (True, True)
+    >>> np.allclose(now["run"]["start_error"], np.abs(stress - 90.0)[:2].max())
+    True
+    >>> np.allclose([now["maximum"]["stress"], now["step"]["whole_stress"]], stress.mean())
+    True
+    >>> np.allclose([now["maximum"]["radiated"], now["stepping"]["previous_radiated"]], radiated)
+    True
+    >>> [float(now[group]["work"]) for group in ("step", "maximum")]
+    [5.0, 5.0]
+    >>> [round(float(now["stepping"][name]), 9) for name in ("previous_size", "two_step", "phase")]
+    [1.0, 1.0, 0.0]
+
+    The state is unknown without an equilibrium, if the front has arrived at a
+    node, or if a node that never weakens slips.
+
+    >>> [plain(SimpleNamespace(solve=solve), run, None, onset, 8.0) for onset in (98.0, 102.0)]
+    [None, None]
+    >>> for node, length in ((1, 0.5), (0, 0.0)):
+    ...     nodes.residual_slip[node] = length
+    ...     print(plain(SimpleNamespace(solve=solve), run, None, 100.0, 8.0))
+    None
+    None
     """
     nodes, grid, loading_rate = run.setting.nodes, run.medium.grid, run.slope(0.0)
     # 2. Two equilibria, and the slip rate between them.

@@ -175,20 +175,26 @@ class DynamicEvent:
     def run(self, max_steps: int) -> None:
         """Step 2: take steps until all is at rest or all nodes have slipped.
 
-        There is a check after every second step out of a window of 16. The slip of
-        the event is 2 m, and in the last nine checks it grows by 0.1 mm.
+        There is a check after every second step out of a window of 16. The event
+        slips by 2 m, and by 0.25 mm more at the fifth check. This is more than
+        1e-4 times 2 m, so the block rests eight checks later. Without such growth
+        it rests as soon as the checks span a window.
 
         >>> from types import SimpleNamespace
         >>> class Scripted(DynamicEvent):
         ...     def take_steps(self, count, ends=True):
         ...         self.steps += count
-        ...         self.waves.slip[0] = 3.0 if self.steps < 10 else 3.0001
+        ...         self.waves.slip[0] = 3.0 if self.steps < 10 else 3.0 + grown
         ...         return self.steps < 100
         >>> before = SimpleNamespace(slip=np.array([1.0, 1.0]))
         >>> waves = SimpleNamespace(slip=np.array([1.0, 1.0]))
         >>> event = Scripted(None, SimpleNamespace(window=15), before, None, waves, None)
-        >>> event.run(1000), event.steps
-        (None, 18)
+        >>> for grown in (0.25e-3, 0.15e-3):
+        ...     waves.slip[:], event.steps = 1.0, 0
+        ...     event.run(1000)
+        ...     print(event.steps)
+        26
+        18
         >>> waves.slip[:], event.steps = 1.0, 0
         >>> event.run(13)  # doctest: +ELLIPSIS
         Traceback (most recent call last):
@@ -225,7 +231,7 @@ def begin(
     >>> from types import SimpleNamespace
     >>> excess, residual = np.array([5.0, 7.0, np.inf]), np.array([1.0, 2.0, 0.0])
     >>> sample = SimpleNamespace(excess=excess, residual=residual)
-    >>> sample.profile, sample.critical = np.array([1.0, 3.0, 2.0]), np.array([2.0, 4.0, np.inf])
+    >>> sample.profile, sample.critical = np.array([1.0, 3.0, 5.0]), np.array([2.0, 4.0, np.inf])
     >>> before = SimpleNamespace(load=10.0, slip=np.array([0.999, 2.5, 0.0]))
     >>> before.direction, mesh = np.array([0.25, 0.5, 0.0]), SimpleNamespace(heights=np.zeros(2))
     >>> stiffness = np.array([[2.0, -1.0, 0.0], [-1.0, 3.0, 0.0], [0.0, -2.0, 2.0]])
