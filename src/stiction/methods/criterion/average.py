@@ -66,7 +66,9 @@ def averages(
     >>> s, p = np.array([3.0, 5.0, 2.0, 8.0, 4.0, 6.0, 1.0, 7.0]), np.ones(8)
     >>> p[[0, 4]] = 2.0, 4.0
     >>> for ends in (None, (0.1, 0.5)):
-    ...     ((fields,),) = averages(Interface(0.8, 8, extent=ends), [window], s[None], p)
+    ...     ((fields,),) = averages(
+    ...         Interface(0.8, 8, extent=ends), [window], s[None], p
+    ...     )
     ...     print(fields.round(4).tolist())
     [3.0667, 2.4375, 4.6, 2.8421, 2.08, 3.25, 3.6, 3.6923]
     [inf, 2.4375, 4.6, inf, inf, inf, inf, inf]
@@ -113,7 +115,9 @@ def least_average(
 
     >>> y = np.zeros((2, 8))
     >>> y[0, [0, 1, 3]], y[1, :2] = (0.5, 0.3, 0.2), 0.5
-    >>> windows = [Window(1.0, (0.4,), 0.4, 1.0, of, np.conj(np.fft.rfft(of))) for of in y]
+    >>> windows = [
+    ...     Window(1.0, (0.4,), 0.4, 1.0, of, np.conj(np.fft.rfft(of))) for of in y
+    ... ]
     >>> s = np.full((2, 8), np.inf)
     >>> s[:, 1:6] = [[5.0, 2.0, 8.0, 4.0, 6.0], [2.0, 3.0, 9.0, 1.0, 9.0]]
     >>> line = Interface(0.8, 8, extent=(0.1, 0.5))
@@ -127,7 +131,9 @@ def least_average(
     >>> s[0, 2, 4:7] = 5.0, 3.0, 4.0
     >>> y = np.eye(1, 64).reshape(8, 8)
     >>> window = Window(1.0, (0.1, 0.1), 0.01, 1.0, y, np.conj(np.fft.rfft2(y)))
-    >>> load, place, _ = least_average(Interface((0.8, 0.8), (8, 8)), [window], s, np.ones((8, 8)))
+    >>> load, place, _ = least_average(
+    ...     Interface((0.8, 0.8), (8, 8)), [window], s, np.ones((8, 8))
+    ... )
     >>> load.round(9).tolist(), place.round(4).tolist()
     ([3.0], [[2.0, 5.1667]])
     """
@@ -163,7 +169,10 @@ def _between_nodes(average: Array) -> Array:
     >>> field[2], field[1, 4], field[3, 4] = [9.0, 9.0, 9.0, 5.0, 3.0, 4.0], 6.0, 4.0
     >>> _between_nodes(field).round(4).tolist()  # 2 + 0.5 * 2/4, 4 + 0.5 * 1/3
     [2.25, 4.1667]
-    >>> _between_nodes(np.array([2.0, 2.0, 2.0])), _between_nodes(np.array([np.inf, 2.0, np.inf]))
+    >>> (
+    ...     _between_nodes(np.array([2.0, 2.0, 2.0])),
+    ...     _between_nodes(np.array([np.inf, 2.0, np.inf])),
+    ... )
     (array([0.]), array([1.]))
     """
     node = np.unravel_index(int(average.argmin()), average.shape)
@@ -190,10 +199,15 @@ def _estimates(values: Array, i: int) -> tuple[float, float]:
     order nothing changes.
 
     >>> values = np.array([9.0, 5.0, 2.0, 3.0, 7.0, 8.0])
-    >>> turned = [(np.roll(values, k), (2 + k) % 6) for k in range(6)] + [(values[::-1].copy(), 3)]
+    >>> turned = [(np.roll(values, k), (2 + k) % 6) for k in range(6)] + [
+    ...     (values[::-1].copy(), 3)
+    ... ]
     >>> {tuple(np.round(_estimates.py_func(*given), 6).tolist()) for given in turned}
     {(1.875, 0.195)}
-    >>> [float(_estimates.py_func(np.array([4.0, 4.0, 1.0, 1.0, 4.0]), i)[0]) for i in (0, 2, 3)]
+    >>> [
+    ...     float(_estimates.py_func(np.array([4.0, 4.0, 1.0, 1.0, 4.0]), i)[0])
+    ...     for i in (0, 2, 3)
+    ... ]
     [inf, inf, 0.625]
     """
     n = values.size
@@ -244,7 +258,9 @@ def _minimum_near(
     >>> values = 3.0 - np.cos(2.0 * np.pi * (i - 5.3) / 32)
     >>> for ratio in (0.0, 2.001, 2.1):
     ...     strength = np.where(abs(i - 5) <= 2, 3.0 * ratio, 0.0)
-    ...     least, place = _minimum_near(values, strength, np.full(32, 3.0), 2, 5, power)
+    ...     least, place = _minimum_near(
+    ...         values, strength, np.full(32, 3.0), 2, 5, power
+    ...     )
     ...     print(f"{least:.6f} {place:.6f}")
     2.000000 5.300000
     2.001000 5.300000
@@ -255,7 +271,9 @@ def _minimum_near(
 
     >>> values = np.maximum(12.0 - i, 17.0 * (i - 9.0) + 5.0)
     >>> for corner, node in ((values, 8), (values[::-1].copy(), 23)):
-    ...     least, place = _minimum_near(corner, -9.0 + 0.0 * i, np.ones(32), 2, node, power)
+    ...     least, place = _minimum_near(
+    ...         corner, -9.0 + 0.0 * i, np.ones(32), 2, node, power
+    ...     )
     ...     print(f"{least:.4f}", 8 < place < 9 or 22 < place < 23)
     3.1111 True
     3.1111 True
@@ -324,8 +342,13 @@ def _minimum_of_rows(
     >>> names = globals() | {"convolve": by_numpy}
     >>> plain = FunctionType(_minimum_of_rows.py_func.__code__, names)
     >>> i, turn = np.arange(32), 2.0 * np.pi / 32
-    >>> gains, (load, place) = 0.5 + 0.5 * np.cos(turn * np.arange(17)), np.zeros((2, 3))
-    >>> s = [3.0 - np.cos(turn * (i - x)) / gains[1] for x in (5.3, 31.7)] + [np.full(32, 7.0)]
+    >>> gains, (load, place) = (
+    ...     0.5 + 0.5 * np.cos(turn * np.arange(17)),
+    ...     np.zeros((2, 3)),
+    ... )
+    >>> s = [3.0 - np.cos(turn * (i - x)) / gains[1] for x in (5.3, 31.7)] + [
+    ...     np.full(32, 7.0)
+    ... ]
     >>> plain(None, np.array(s), np.full(32, 2.0), gains, 4, load, place)
     >>> load.round(6).tolist(), place.round(4).tolist()
     ([1.0, 1.0, 3.5], [5.3, 31.7, 0.0])

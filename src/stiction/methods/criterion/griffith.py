@@ -91,7 +91,9 @@ def griffith_length(
     --------
     >>> import stiction as st
     >>> problem = st.paper.problem(nodes=512)
-    >>> st.theory.griffith_length(problem, 1e6, 0.5) > st.theory.griffith_length(problem, 2e6, 0.5)
+    >>> st.theory.griffith_length(problem, 1e6, 0.5) > st.theory.griffith_length(
+    ...     problem, 2e6, 0.5
+    ... )
     True
 
     A uniform stress drop D gives G = D² L tan(pi a/L)/(2 G*), and a crack
@@ -114,7 +116,12 @@ def griffith_length(
     ...     for arrest in (False, True)
     ... ]
     >>> rates = [
-    ...     release_rates(falling, 2e6, np.array([end * (1.0 + d) for d in (-1e-6, 1e-6)]), 0.051)
+    ...     release_rates(
+    ...         falling,
+    ...         2e6,
+    ...         np.array([end * (1.0 + d) for d in (-1e-6, 1e-6)]),
+    ...         0.051,
+    ...     )
     ...     for end in ends
     ... ]
     >>> [(rate.min(axis=1) > 1.0).tolist() for rate in rates], ends[0] < ends[1]
@@ -157,8 +164,15 @@ def release_rates(problem: Problem, load: Any, lengths: Array, centre: float) ->
     >>> problem = st.paper.problem(nodes=144)
     >>> friction = st.LinearWeakening(weakening_rate=5e11, residual_strength=1e6)
     >>> problem = dataclasses.replace(problem, friction=friction)
-    >>> rates = release_rates(problem, np.array([4e6, 0.0])[:, None, None], np.array([0.02]), 0.03)
-    >>> unit = 1e12 * 0.1 * np.tan(np.pi * 0.01 / 0.1) / (2.0 * problem.effective_modulus)
+    >>> rates = release_rates(
+    ...     problem, np.array([4e6, 0.0])[:, None, None], np.array([0.02]), 0.03
+    ... )
+    >>> unit = (
+    ...     1e12
+    ...     * 0.1
+    ...     * np.tan(np.pi * 0.01 / 0.1)
+    ...     / (2.0 * problem.effective_modulus)
+    ... )
     >>> (rates / unit).round(6).tolist()
     [[[9.0, 9.0]], [[-1.0, -1.0]]]
     """
@@ -205,7 +219,10 @@ def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: f
 
     >>> from types import SimpleNamespace
     >>> import stiction as st
-    >>> line, drops = SimpleNamespace(interface=st.Interface(1.0, 8)), np.full((2, 8), 2.0)
+    >>> line, drops = (
+    ...     SimpleNamespace(interface=st.Interface(1.0, 8)),
+    ...     np.full((2, 8), 2.0),
+    ... )
     >>> drops[1] = np.eye(8)[0] * 5.0
     >>> lengths = np.array([2e-4, 0.5])
     >>> K = _intensity_factors(line, drops, lengths, 0.95)
@@ -213,7 +230,9 @@ def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: f
     [[2.0, 2.0], [2.0, 2.0]]
     >>> (K[1, 0] / np.sqrt(np.pi * 1e-4)).round(5).tolist()
     [2.998, 3.002]
-    >>> _intensity_factors(line, drops, np.full(2100, 0.5), 0.95).shape  # more than fit at once
+    >>> _intensity_factors(
+    ...     line, drops, np.full(2100, 0.5), 0.95
+    ... ).shape  # more than fit at once
     (2, 2100, 2)
     """
     interface, period = problem.interface, problem.interface.measure

@@ -141,7 +141,9 @@ class LocalCriterion(Listed):
         """Return the approximate time for a sample on a core, s.
 
         >>> import stiction as st
-        >>> seconds = st.LocalCriterion().seconds_per_sample(st.paper.problem(nodes=1000))
+        >>> seconds = st.LocalCriterion().seconds_per_sample(
+        ...     st.paper.problem(nodes=1000)
+        ... )
         >>> print(f"{seconds:.3g}")  # 0.03 + 0.03 ms
         6e-05
         """
@@ -162,7 +164,9 @@ class LocalCriterion(Listed):
         ...     st.LinearWeakening(weakening_rate=np.linspace(1e11, 2e11, 512)),
         ... ]
         >>> for law in laws:
-        ...     reasons = st.LocalCriterion().supports(dataclasses.replace(problem, friction=law))
+        ...     reasons = st.LocalCriterion().supports(
+        ...         dataclasses.replace(problem, friction=law)
+        ...     )
         ...     print([reason[:46] for reason in reasons])
         ['friction.strength: begins with a plateau, on w']
         ['friction: this law falls up to 4 times as stee']
@@ -203,7 +207,12 @@ class LocalCriterion(Listed):
         <p> <= <tau_p - tau_i>. An interface that ends has no bounds.
 
         >>> from types import SimpleNamespace
-        >>> cases = [(False, None, False), (True, None, False), (False, 1, False), (False, 1, True)]
+        >>> cases = [
+        ...     (False, None, False),
+        ...     (True, None, False),
+        ...     (False, 1, False),
+        ...     (False, 1, True),
+        ... ]
         >>> for held, specimen, machine in cases:
         ...     problem = SimpleNamespace(specimen=specimen, has_machine=machine)
         ...     problem.interface = SimpleNamespace(is_held=held)
@@ -230,7 +239,9 @@ class LocalCriterion(Listed):
         >>> laws += [st.LinearWeakening(critical_slip=1e-6)]
         >>> [unfit(dataclasses.replace(problem, friction=law), set()) for law in laws]
         ['strength does not fall linearly with slip', 'the weakening rate is not uniform']
-        >>> long = dataclasses.replace(problem, friction=st.LinearWeakening(weakening_rate=1e10))
+        >>> long = dataclasses.replace(
+        ...     problem, friction=st.LinearWeakening(weakening_rate=1e10)
+        ... )
         >>> unfit(long, set())
         'a critical patch does not fit on the interface'
         """
@@ -263,7 +274,10 @@ class LocalCriterion(Listed):
         >>> interface = st.Interface(0.1, 144, extent=(0.01, 0.07))
         >>> held = dataclasses.replace(problem, interface=interface)
         >>> samples = [one.sample(np.full(144, 1e6)) for one in (problem, held)]
-        >>> [method.may_differ(problem, samples[0], np.array([stress])) for stress in (1e6, 1.03e6)]
+        >>> [
+        ...     method.may_differ(problem, samples[0], np.array([stress]))
+        ...     for stress in (1e6, 1.03e6)
+        ... ]
         [False, True]
         >>> method.may_differ(held, samples[1], np.array([1e6]))
         True
@@ -311,13 +325,17 @@ class LocalCriterion(Listed):
         >>> problem = st.Problem(
         ...     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0),
         ...     interface=st.Interface((0.1, 0.1), (64, 64)),
-        ...     friction=st.LinearWeakening(), load=st.Load(initial_stress=3e5),
+        ...     friction=st.LinearWeakening(),
+        ...     load=st.Load(initial_stress=3e5),
         ... )
         >>> rates = np.array([1e11, 1.5e11])[:, None, None] * np.ones((2, 64, 64))
         >>> strength = np.array([1e6, 2e6])[:, None, None] * np.ones((2, 64, 64))
         >>> profiles = {"strength": strength, "weakening_rate": rates}
         >>> values = LocalCriterion().prepare(problem)(problem.sample(profiles))
-        >>> (values["critical_load"] / 1e5).round(6).tolist(), values["critical_position"].shape
+        >>> (
+        ...     (values["critical_load"] / 1e5).round(6).tolist(),
+        ...     values["critical_position"].shape,
+        ... )
         ([7.0, 17.0], (2, 2))
         >>> (values["critical_stress"] / 1e5).round(6).tolist()
         [10.0, 20.0]
@@ -372,16 +390,22 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
     >>> windows = SimpleNamespace(starts=np.arange(2), widths=np.array([2, 3]))
     >>> blocks = SimpleNamespace(windows=lambda *rates: windows, relief=1.0)
     >>> sample = SimpleNamespace(
-    ...     strength=np.full((2, 6), 9.0), samples=2,
+    ...     strength=np.full((2, 6), 9.0),
+    ...     samples=2,
     ...     initial_stress=np.array([[1.0] * 6, [2.0] * 6]),
-    ...     weakening_rate=np.array([[3.0] * 6, [4.0] * 6]), uniform_weakening=True,
-    ...     load_profile=np.ones(6), mean_stress=lambda load: 2.0 * load,
+    ...     weakening_rate=np.array([[3.0] * 6, [4.0] * 6]),
+    ...     uniform_weakening=True,
+    ...     load_profile=np.ones(6),
+    ...     mean_stress=lambda load: 2.0 * load,
     ... )
     >>> problem = SimpleNamespace(interface=interface, blocks=blocks)
     >>> values = plain(problem, sample)
     >>> values["critical_load"].tolist(), values["critical_stress"].tolist()
     ([8.0, 7.0], [9.0, 5.0])
-    >>> values["critical_position"].tolist(), values["critical_patch_length"].tolist()
+    >>> (
+    ...     values["critical_position"].tolist(),
+    ...     values["critical_patch_length"].tolist(),
+    ... )
     ([0.875, 0.875], [0.75, 0.75])
     >>> blocks.relief = 0.0
     >>> plain(problem, sample)["critical_stress"].tolist()
@@ -463,7 +487,9 @@ def _relief_of_patch(problem: Problem, W: float, run: slice, drive: Array) -> fl
     >>> relief = lambda slip: float(np.array([100.0, 10.0, 1.0, 0.1]) @ slip)
     >>> problem = SimpleNamespace(blocks=SimpleNamespace(stiffness=K), relief=relief)
     >>> slip, ends = np.array([2.0, 5.0, -2.0]), np.array([1.0, 0.0, 1.0])
-    >>> drive = np.append(99.0, (K[1:, 1:] - 0.5 * np.eye(3)) @ slip + 0.5 * 3.0 * ends)
+    >>> drive = np.append(
+    ...     99.0, (K[1:, 1:] - 0.5 * np.eye(3)) @ slip + 0.5 * 3.0 * ends
+    ... )
     >>> round(_relief_of_patch(problem, 0.5, slice(1, 4), drive), 9)
     25.0
     """
@@ -512,7 +538,9 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     --------
     >>> import stiction as st
     >>> problem = st.paper.problem(nodes=512)
-    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(
+    ...     problem.interface, seed=1
+    ... )
     >>> tau_n = st.theory.nucleation_stress(problem, tau_p)
     >>> bool(tau_p.min() < tau_n.min() < tau_n.max() < tau_p.max())
     True
@@ -576,7 +604,9 @@ def _warn_if_coarse(problem: Problem, sample: Sample) -> None:
     >>> problem, plane = st.paper.problem(nodes=256), SimpleNamespace(is_plane=True)
     >>> for nodes in (7.9, 8.1, 11.9, 12.1):
     ...     length = nodes * problem.interface.spacing
-    ...     rate = problem.friction.weakening_rate * problem.nucleation_length / length
+    ...     rate = (
+    ...         problem.friction.weakening_rate * problem.nucleation_length / length
+    ...     )
     ...     sample = SimpleNamespace(steepest_weakening_rate=rate)
     ...     with collect_warnings() as warned:
     ...         _warn_if_coarse(problem, sample)
@@ -607,10 +637,14 @@ def _weakening_rates(sample: Sample) -> Iterator[tuple[float, NDArray[np.int64]]
 
     >>> from types import SimpleNamespace
     >>> rates = np.array([[3.0, 3.0], [2.0, 2.0], [3.0, 3.0]])
-    >>> sample = SimpleNamespace(uniform_weakening=True, samples=3, weakening_rate=rates)
+    >>> sample = SimpleNamespace(
+    ...     uniform_weakening=True, samples=3, weakening_rate=rates
+    ... )
     >>> [(rate, rows.tolist()) for rate, rows in _weakening_rates(sample)]
     [(2.0, [1]), (3.0, [0, 2])]
-    >>> next(_weakening_rates(SimpleNamespace(uniform_weakening=False)))  # doctest: +ELLIPSIS
+    >>> next(
+    ...     _weakening_rates(SimpleNamespace(uniform_weakening=False))
+    ... )  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
     stiction.base.errors.InputError: weakening_rate: varies along the interface, so the ...

@@ -113,7 +113,10 @@ def _least_difference(
     >>> column = np.fft.irfft(np.pi / 4.0 * np.arange(5), 8)
     >>> of_nodes = column, np.full(8, 5.0), np.full(8, 1.0), np.full(8, 0.5)
     >>> loads = [np.full(8, 5.0 / ratio) for ratio in (1.05, 1.0, 0.95)]
-    >>> [[round(_least_difference(*of_nodes, load, side), 9) for side in (-1, 1)] for load in loads]
+    >>> [
+    ...     [round(_least_difference(*of_nodes, load, side), 9) for side in (-1, 1)]
+    ...     for load in loads
+    ... ]
     [[0.0, 0.04], [0.0, 0.0], [0.04, 0.0]]
     """
     least = 0.0
@@ -160,7 +163,10 @@ def slides(
     ...         strength = np.maximum(peak - W * slip, residual)
     ...         slip += 0.3 * np.maximum(load - stiffness @ slip - strength, 0.0)
     ...     slipped = slip > (peak - residual) / W
-    ...     print(slides(column, peak, residual, W, load), np.flatnonzero(slipped).tolist())
+    ...     print(
+    ...         slides(column, peak, residual, W, load),
+    ...         np.flatnonzero(slipped).tolist(),
+    ...     )
     False []
     False [3, 4]
     True [0, 1, 2, 3, 4, 5, 6, 7]
@@ -222,7 +228,11 @@ def _unstoppable_nodes(
     G* is 2 Pa, and the nodes are 0.5 m apart. The energies are 4 and 1 J/m²,
     and the stress drops are 2 and 0.5 Pa.
 
-    >>> column, peak, residual = np.array([np.pi]), np.array([5.0, 3.0]), np.array([1.0, 2.0])
+    >>> column, peak, residual = (
+    ...     np.array([np.pi]),
+    ...     np.array([5.0, 3.0]),
+    ...     np.array([1.0, 2.0]),
+    ... )
     >>> W, load = np.array([2.0, 0.5]), np.array([3.0, 2.5])
     >>> nodes = _unstoppable_nodes(column, peak, residual, W, load)
     >>> print(f"{nodes:.4f} {4.0 * 2.0 * 4.0 / (np.pi * 0.5**2) / 0.5:.4f}")

@@ -86,11 +86,18 @@ def eigenvalue_and_vector(terms: int = N_SINES) -> tuple[float, Array]:
     A single sine gives A/B = (pi/4)/(4/3). Of three sines the second is left
     out, and the others solve (A - lambda B) a = 0. The limit is 0.578887.
 
-    >>> print(f"{eigenvalue_and_vector(1)[0] * 16.0 / np.pi:.6f} {eigenvalue_and_vector()[0]:.6f}")
+    >>> print(
+    ...     f"{eigenvalue_and_vector(1)[0] * 16.0 / np.pi:.6f} {eigenvalue_and_vector()[0]:.6f}"
+    ... )
     3.000000 0.578887
     >>> value, a = eigenvalue_and_vector(3)
-    >>> rows = value * (4 / 3 - 4 / 15 * a[2]), value * (36 / 35 * a[2] - 4 / 15) / a[2]
-    >>> np.round(rows, 6).tolist() == np.round([np.pi / 4, 3 * np.pi / 4], 6).tolist()
+    >>> rows = (
+    ...     value * (4 / 3 - 4 / 15 * a[2]),
+    ...     value * (36 / 35 * a[2] - 4 / 15) / a[2],
+    ... )
+    >>> np.round(rows, 6).tolist() == np.round(
+    ...     [np.pi / 4, 3 * np.pi / 4], 6
+    ... ).tolist()
     True
     >>> a[:2].tolist(), a.flags.writeable
     ([1.0, 0.0], False)
@@ -120,7 +127,10 @@ def weight(s: Array) -> Array:
     >>> print(f"{np.pi * np.mean(weight(np.cos(t)) * np.sin(t)):.9f}")
     1.000000000
     >>> ends = weight(np.array([-1.2, -1.0, -0.3, 0.3, 0.9, 1.5]))
-    >>> ends[[0, 1, 5]].round(9).tolist(), bool(ends[2] >= ends[3] - 1e-9 > ends[4] > 0.2)
+    >>> (
+    ...     ends[[0, 1, 5]].round(9).tolist(),
+    ...     bool(ends[2] >= ends[3] - 1e-9 > ends[4] > 0.2),
+    ... )
     ([0.0, 0.0, 0.0], True)
     """
     inside = np.abs(s) <= 1.0
@@ -141,7 +151,9 @@ def multiplier(z: Array) -> Array:
     The sum over many points of the patch agrees. A constant does not change.
 
     >>> s = (np.arange(4000) + 0.5) / 2000 - 1.0
-    >>> waves = multiplier(np.linspace(0.0, 300.0, 30001))  # more than are computed at once
+    >>> waves = multiplier(
+    ...     np.linspace(0.0, 300.0, 30001)
+    ... )  # more than are computed at once
     >>> for number in (0, 300, 30000):  # z = 0, 3 and 300
     ...     integral = weight(s) @ np.cos(number / 100.0 * s) / 2000
     ...     print(f"{waves[number]:.4f} {abs(waves[number] - integral):.4f}")
@@ -184,7 +196,9 @@ def grid_weights(half_width: float) -> Array:
     >>> print(f"{wave:.4f} {multiplier(z)[0]:.4f}")
     0.2799 0.2799
     >>> nodes = np.arange(16)
-    >>> np.allclose(30.0 * grid_weights(30.0)[nodes], weight(nodes / 30.0), rtol=1e-6)
+    >>> np.allclose(
+    ...     30.0 * grid_weights(30.0)[nodes], weight(nodes / 30.0), rtol=1e-6
+    ... )
     True
     """
     last = int(np.ceil(half_width)) + 1
@@ -269,8 +283,15 @@ def windows_of(
     >>> import stiction as st
     >>> problem = st.paper.problem(nodes=256)
     >>> length, rate = problem.nucleation_length, problem.friction.weakening_rate
-    >>> ((window,), (double,)) = windows_of(problem, rate), windows_of(problem, 0.5 * rate)
-    >>> round(window.extents[0] / length, 6), round(double.area / length, 6), window.aspect
+    >>> ((window,), (double,)) = (
+    ...     windows_of(problem, rate),
+    ...     windows_of(problem, 0.5 * rate),
+    ... )
+    >>> (
+    ...     round(window.extents[0] / length, 6),
+    ...     round(double.area / length, 6),
+    ...     window.aspect,
+    ... )
     (1.0, 2.0, 1.0)
     >>> near = int(0.5 * length / problem.interface.spacing)  # nodes on either side
     >>> [bool(window.weight[i] > 1e-3) for i in (0, near, -near, near + 2)]
@@ -280,7 +301,9 @@ def windows_of(
     ...     interface=st.Interface((0.1, 0.1), (40, 40)),
     ...     friction=st.LinearWeakening(weakening_rate=1e11),
     ... )
-    >>> [round(y.aspect, 6) for y in windows_of(plane, 1e11, (0.9, 1.8))]  # over sqrt(0.81) = 0.9
+    >>> [
+    ...     round(y.aspect, 6) for y in windows_of(plane, 1e11, (0.9, 1.8))
+    ... ]  # over sqrt(0.81) = 0.9
     [1.0, 2.0]
     """
     interface, solid = problem.interface, problem.solid
@@ -334,9 +357,13 @@ def _within_extent(interface: Interface, windows: list[Window]) -> list[Window]:
     wide for four nodes.
 
     >>> y = [1.0 * (np.arange(8) < count) for count in (3, 5)]
-    >>> three, five = (Window(1.0, (0.1 * w.sum(),), 0.0, 1.0, w, np.fft.rfft(w)) for w in y)
+    >>> three, five = (
+    ...     Window(1.0, (0.1 * w.sum(),), 0.0, 1.0, w, np.fft.rfft(w)) for w in y
+    ... )
     >>> line = Interface(0.8, 8, extent=(0.2, 0.5))
-    >>> [fitting.extents for fitting in _within_extent(line, [five, three])] == [three.extents]
+    >>> [fitting.extents for fitting in _within_extent(line, [five, three])] == [
+    ...     three.extents
+    ... ]
     True
     >>> _within_extent(line, [five])  # doctest: +ELLIPSIS
     Traceback (most recent call last):
@@ -387,14 +414,20 @@ def ellipse_window(
     >>> G, half_spaces = 1e9, HalfSpaces((0.08, 0.08), (1e9, 1e9))
     >>> W = 2.0061 * G / 0.02
     >>> disc = ellipse_window(half_spaces, (64, 64), W, 1.0)
-    >>> print(f"{disc.extents[0]:.3f} {disc.area / (np.pi * 0.01**2):.1f} {disc.total:.6f}")
+    >>> print(
+    ...     f"{disc.extents[0]:.3f} {disc.area / (np.pi * 0.01**2):.1f} {disc.total:.6f}"
+    ... )
     0.020 1.0 1.000000
     >>> print(f"{disc.weight[2, 0] / disc.weight[0, -2]:.6f} {disc.weight[9, 0]:g}")
     1.000000 0
     >>> long = ellipse_window(half_spaces, (64, 64), W, 2.0)
     >>> print(f"{long.area / (np.pi * long.extents[0] * long.extents[1] / 4.0):.1f}")
     1.0
-    >>> print(long.extents[0] / long.extents[1], disc.eigenvalue <= W, long.eigenvalue <= W)
+    >>> print(
+    ...     long.extents[0] / long.extents[1],
+    ...     disc.eigenvalue <= W,
+    ...     long.eigenvalue <= W,
+    ... )
     2.0 True True
     >>> ellipse_window(half_spaces, (64, 64), 0.02 * W, 1.0) is None
     True
@@ -447,16 +480,22 @@ def _smallest_unstable(
     The eigenvalues of the matrices for all ellipses show which is the
     smallest with an eigenvalue below W.
 
-    >>> column = np.fft.irfft2(HalfSpaces((16.0, 16.0), (1.0, 0.8)).symbol((16, 16)), (16, 16))
+    >>> column = np.fft.irfft2(
+    ...     HalfSpaces((16.0, 16.0), (1.0, 0.8)).symbol((16, 16)), (16, 16)
+    ... )
     >>> x, at = np.fft.fftfreq(16, 1.0 / 16), np.array([*np.ndindex(16, 16)])
     >>> distance = x[:, None] ** 2 + (1.3 * x[None, :]) ** 2
     >>> K, radii = column[tuple((at[:, None] - at).T % 16)], np.unique(distance)
     >>> inside = [distance.ravel() <= r for r in radii]
-    >>> lowest = np.array([np.linalg.eigvalsh(K[np.ix_(S, S)])[0] for S in inside[:40]])
+    >>> lowest = np.array(
+    ...     [np.linalg.eigvalsh(K[np.ix_(S, S)])[0] for S in inside[:40]]
+    ... )
     >>> W = 0.4
     >>> square = radii[np.argmax(lowest <= W)]
     >>> ellipse = _smallest_unstable(column, distance, W, 0.0, 36.0)
-    >>> print(f"{ellipse.square / square:.6f} {ellipse.eigenvalue / lowest[lowest <= W][0]:.6f}")
+    >>> print(
+    ...     f"{ellipse.square / square:.6f} {ellipse.eigenvalue / lowest[lowest <= W][0]:.6f}"
+    ... )
     1.000000 1.000000
     >>> _smallest_unstable(column, distance, W, 0.0, 0.99 * square) is None
     True

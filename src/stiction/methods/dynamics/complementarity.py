@@ -63,13 +63,26 @@ def _solve(problem: SlipProblem, accuracy: float) -> Any:
     >>> import numpy as np
     >>> def by_numpy(transform, multiplier, field, spectrum, out):
     ...     out[:] = np.fft.irfft(multiplier * np.fft.rfft(field), out.size)
-    >>> plain = FunctionType(_solve.py_func.__code__, globals() | {"convolve": by_numpy})
-    >>> symbol, falling = np.array([2.0, 3.0, 5.0, 6.0]), np.array([0.5, 1.0, 9.0, 0.0, 0.25, 1.5])
-    >>> fields = {name: np.zeros(6) for name in ("product", "cg_residual", "cg_direction")}
+    >>> plain = FunctionType(
+    ...     _solve.py_func.__code__, globals() | {"convolve": by_numpy}
+    ... )
+    >>> symbol, falling = (
+    ...     np.array([2.0, 3.0, 5.0, 6.0]),
+    ...     np.array([0.5, 1.0, 9.0, 0.0, 0.25, 1.5]),
+    ... )
+    >>> fields = {
+    ...     name: np.zeros(6) for name in ("product", "cg_residual", "cg_direction")
+    ... }
     >>> problem = SimpleNamespace(
-    ...     transform=None, work=None, symbol=symbol, inverse=1.0 / symbol, **fields,
-    ...     cg_preconditioned=np.zeros(6), increment=np.array([0.1, 0.2, 0.0, 0.0, 0.3, 0.0]),
-    ...     slipping=np.array([1, 1, 0, 0, 1, 1]), falling=falling,
+    ...     transform=None,
+    ...     work=None,
+    ...     symbol=symbol,
+    ...     inverse=1.0 / symbol,
+    ...     **fields,
+    ...     cg_preconditioned=np.zeros(6),
+    ...     increment=np.array([0.1, 0.2, 0.0, 0.0, 0.3, 0.0]),
+    ...     slipping=np.array([1, 1, 0, 0, 1, 1]),
+    ...     falling=falling,
     ...     driving=np.array([4.0, -3.0, 9.0, 9.0, 1.0, 2.0]),
     ... )
     >>> plain(problem, 1e-10)
@@ -158,13 +171,29 @@ def solve_increment(
     ...     weakens = peak[i] - W[i] * (slip + ahead) > residual[i]
     ...     return (peak[i] - W[i] * slip, W[i]) if weakens else (residual[i], 0.0)
     >>> plain = globals() | {"convolve": by_numpy, "node_line": line}
-    >>> plain["node_strength"] = lambda setting, i, slip: line(setting, i, slip, 0.0)[0]
+    >>> plain["node_strength"] = lambda setting, i, slip: line(
+    ...     setting, i, slip, 0.0
+    ... )[0]
     >>> for kernel in (_solve, solve_increment):
     ...     plain[kernel.__name__] = FunctionType(kernel.py_func.__code__, plain)
-    >>> fields = "product", "cg_residual", "cg_direction", "cg_preconditioned", "driving", "falling"
-    >>> symbol, trial = np.array([2.0, 3.0, 5.0, 6.0]), np.array([1.0, 12.0, 20.0, 8.0, 3.0, 5.0])
+    >>> fields = (
+    ...     "product",
+    ...     "cg_residual",
+    ...     "cg_direction",
+    ...     "cg_preconditioned",
+    ...     "driving",
+    ...     "falling",
+    ... )
+    >>> symbol, trial = (
+    ...     np.array([2.0, 3.0, 5.0, 6.0]),
+    ...     np.array([1.0, 12.0, 20.0, 8.0, 3.0, 5.0]),
+    ... )
     >>> problem = SimpleNamespace(
-    ...     transform=None, work=None, symbol=symbol, inverse=1.0 / symbol, trial=trial,
+    ...     transform=None,
+    ...     work=None,
+    ...     symbol=symbol,
+    ...     inverse=1.0 / symbol,
+    ...     trial=trial,
     ...     **{name: np.zeros(6) for name in fields},
     ...     increment=np.array([0.0, 0.1, 0.5, 0.0, 0.2, 0.0]),
     ...     slipping=np.array([0, 1, 0, 0, 1, 0]),

@@ -125,8 +125,12 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
     >>> nodes = Nodes(peak, residual, np.ones(3), np.ones(3), profile, initial)
     >>> scale = stress_scale(nodes)
     >>> for load in (1.0, 1.5, 2.5, 3.5, 20.0):
-    ...     drop = np.minimum(peak - residual, 3.0 * (load * profile + initial - residual))
-    ...     print(f"{value_at(scale, load):.4f} {np.maximum(drop[[0, 2]], 0.0).mean():.4f}")
+    ...     drop = np.minimum(
+    ...         peak - residual, 3.0 * (load * profile + initial - residual)
+    ...     )
+    ...     print(
+    ...         f"{value_at(scale, load):.4f} {np.maximum(drop[[0, 2]], 0.0).mean():.4f}"
+    ...     )
     0.0000 0.0000
     1.5000 1.5000
     3.3750 3.3750
@@ -155,7 +159,12 @@ def _set_maximum(step: Any, maximum: Any, radiated: float) -> None:
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS
     >>> now = np.zeros(1, DIAGNOSTICS).view(np.recarray)[0]
     >>> step, maximum = now.step, now.maximum
-    >>> step.time, step.load, step.mean_stress, step.whole_stress = 3.0, 5.0, 7.0, 8.0
+    >>> step.time, step.load, step.mean_stress, step.whole_stress = (
+    ...     3.0,
+    ...     5.0,
+    ...     7.0,
+    ...     8.0,
+    ... )
     >>> step.strength_change, step.top_node, maximum.largest_fall = -2.0, 4, 9.0
     >>> _set_maximum.py_func(step, maximum, 0.5)
     >>> print(*(f"{name}={maximum[name]:g}" for name in maximum.dtype.names))
@@ -179,10 +188,23 @@ def _begin_event(now: Any) -> None:
     >>> maxima = [(6.0, 5.0, 0.1, 11.0, 3), (6.2, 5.5, 0.2, 12.0, 2)]
     >>> maxima += [(7.0, 4.0, 0.3, 13.0, 1), (6.5, 4.5, 0.4, 14.0, 5)]
     >>> for stress, breakable, time, load, node in maxima:
-    ...     now.maximum.stress, now.maximum.breakable, now.maximum.node = stress, breakable, node
-    ...     now.maximum.time, now.maximum.load, now.step.top_slip_rate = time, load, 0.25
+    ...     now.maximum.stress, now.maximum.breakable, now.maximum.node = (
+    ...         stress,
+    ...         breakable,
+    ...         node,
+    ...     )
+    ...     now.maximum.time, now.maximum.load, now.step.top_slip_rate = (
+    ...         time,
+    ...         load,
+    ...         0.25,
+    ...     )
     ...     _begin_event.py_func(now)
-    >>> print(*(f"{name}={now.results[name]:g}" for name in now.results.dtype.names[:5]))
+    >>> print(
+    ...     *(
+    ...         f"{name}={now.results[name]:g}"
+    ...         for name in now.results.dtype.names[:5]
+    ...     )
+    ... )
     first_stress=5 onset_stress=7 critical_stress=5.5 onset_time=0.3 onset_load=13
     >>> [int(now.results[name]) for name in ("instabilities", "onset_node")]
     [4, 1]
@@ -212,13 +234,28 @@ def end_event(now: Any, unstable_slip_rate: float, radiated: float) -> None:
     >>> from types import FunctionType
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS
     >>> names = globals() | {"_set_maximum": _set_maximum.py_func}
-    >>> plain = FunctionType(end_event.py_func.__code__, names)  # without compilation
+    >>> plain = FunctionType(
+    ...     end_event.py_func.__code__, names
+    ... )  # without compilation
     >>> now = np.zeros(1, DIAGNOSTICS).view(np.recarray)[0]
-    >>> for unstable, rate, broken in ((1, 0.6, 0), (1, 0.5, 0), (1, 0.6, 1), (0, 0.6, 0)):
-    ...     now.event.unstable, now.event.slip_rate, now.results.all_broken = unstable, rate, broken
+    >>> for unstable, rate, broken in (
+    ...     (1, 0.6, 0),
+    ...     (1, 0.5, 0),
+    ...     (1, 0.6, 1),
+    ...     (0, 0.6, 0),
+    ... ):
+    ...     now.event.unstable, now.event.slip_rate, now.results.all_broken = (
+    ...         unstable,
+    ...         rate,
+    ...         broken,
+    ...     )
     ...     now.step.whole_stress += 1.0
     ...     plain(now, 0.5, 0.0)
-    ...     flags = now.event.last_arrested, now.results.arrested_events, now.event.unstable
+    ...     flags = (
+    ...         now.event.last_arrested,
+    ...         now.results.arrested_events,
+    ...         now.event.unstable,
+    ...     )
     ...     print(*flags, now.maximum.stress)
     1 1 0 1.0
     0 1 0 2.0
@@ -242,8 +279,8 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
 
     The scale makes a drop of 1 Pa an instability. The stress rises, stays,
     falls by 0.05 Pa, falls by 2 Pa (but waves took off 1.5 Pa), and
-    recovers. A deep fall without weakening is not an instability, and a
-    small fall after it neither. Then the last nodes reach their residual
+    recovers. A deep fall without weakening and a small fall after
+    it are no instabilities. Then the last nodes reach their residual
     strength: the instability was the sliding, and not arrested.
 
     >>> from types import FunctionType, SimpleNamespace
@@ -258,12 +295,26 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
     >>> steps += [(98.0, 1.75, -3.0, 0), (101.0, 0.5, -3.0, 0), (95.0, 4.0, -3.5, 3)]
     >>> steps += [(100.5, 1.0, -3.6, 3), (94.0, 5.0, -3.6, 4)]
     >>> for node, (stress, radiated, change, weakened) in enumerate(steps):
-    ...     step.whole_stress, step.strength_change, step.weakened_nodes = stress, change, weakened
+    ...     step.whole_stress, step.strength_change, step.weakened_nodes = (
+    ...         stress,
+    ...         change,
+    ...         weakened,
+    ...     )
     ...     step.top_node, step.top_slip_rate = node, (0.6 if node == 3 else 0.4)
     ...     step.mean_stress = 0.5 * stress
     ...     fall = plain["observe"](now, thresholds, radiated)
-    ...     state = results.instabilities, results.arrested_events, results.all_broken
-    ...     print(f"{fall:.2f}", *state, now.event.unstable, now.maximum.node, now.maximum.stress)
+    ...     state = (
+    ...         results.instabilities,
+    ...         results.arrested_events,
+    ...         results.all_broken,
+    ...     )
+    ...     print(
+    ...         f"{fall:.2f}",
+    ...         *state,
+    ...         now.event.unstable,
+    ...         now.maximum.node,
+    ...         now.maximum.stress,
+    ...     )
     -100.00 0 0 0 0 0 100.0
     0.00 0 0 0 0 0 100.0
     0.05 0 0 0 0 2 100.0
@@ -272,7 +323,11 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
     0.00 1 1 0 0 4 101.0
     0.00 1 1 0 0 4 101.0
     0.00 1 0 1 0 4 101.0
-    >>> float(results.kinetic_stress), int(results.onset_node), round(float(now.event.slip_rate), 9)
+    >>> (
+    ...     float(results.kinetic_stress),
+    ...     int(results.onset_node),
+    ...     round(float(now.event.slip_rate), 9),
+    ... )
     (47.0, 2, 0.6)
     """
     step, maximum, event, results = now.step, now.maximum, now.event, now.results
@@ -333,12 +388,19 @@ def finish_step(
     >>> residual_slip = np.array([0.8, 0.25, 0.0, np.inf, 1.0])
     >>> peak = np.array([8.0, 6.0, 7.0, np.inf, 9.0])
     >>> thresholds = SimpleNamespace(
-    ...     front_share=0.5, breakable=4, period_nodes=6, held=True, unstable_slip_rate=2.5,
+    ...     front_share=0.5,
+    ...     breakable=4,
+    ...     period_nodes=6,
+    ...     held=True,
+    ...     unstable_slip_rate=2.5,
     ...     settling_time=5.0,
     ... )
     >>> setting = SimpleNamespace(
-    ...     nodes=SimpleNamespace(residual_slip=residual_slip, peak=peak), thresholds=thresholds,
-    ...     mean_initial=1.0, mean_profile=0.5, grid=SimpleNamespace(impedance=4.0),
+    ...     nodes=SimpleNamespace(residual_slip=residual_slip, peak=peak),
+    ...     thresholds=thresholds,
+    ...     mean_initial=1.0,
+    ...     mean_profile=0.5,
+    ...     grid=SimpleNamespace(impedance=4.0),
     ...     scale=PiecewiseLinear(np.array([0.0, 10.0]), np.array([0.0, 30.0])),
     ...     stations=np.array([2, 0]),
     ... )
@@ -356,13 +418,20 @@ def finish_step(
     ...     print(*(f"{name}={step[name]:.4g}" for name in names))
     mean_slip=0.225 mean_slip_rate=0.75 mean_stress=1.5 whole_stress=4
     strength_change=-2.333 top_slip_rate=3 top_node=1 weakened_nodes=2
-    >>> float(now.run.scale), float(now.run.reverse_margin), int(now.run.reverse_node)
+    >>> (
+    ...     float(now.run.scale),
+    ...     float(now.run.reverse_margin),
+    ...     int(now.run.reverse_node),
+    ... )
     (30.0, -4.0, 2)
     >>> int(now.event.fast), float(now.event.fast_since), float(now.event.peak_rate)
     (1, 10.0, 0.75)
     >>> float(record.steps[1].load), record.stations[1].slip.tolist()
     (10.0, [0.05, 0.5])
-    >>> record.stations[1].slip_rate.tolist(), record.stations[1].shear_stress.tolist()
+    >>> (
+    ...     record.stations[1].slip_rate.tolist(),
+    ...     record.stations[1].shear_stress.tolist(),
+    ... )
     ([2.0, 1.0], [-6.0, 4.0])
 
     After the settling time without fast slip, the event ends.
@@ -371,7 +440,9 @@ def finish_step(
     >>> for time, rate in ((12.0, 2.6), (16.9, 2.4), (17.0, 2.4)):
     ...     state.slip_rate[:], later = rate, taken._replace(time=time, radiated=1.0)
     ...     _ = plain["finish_step"](state, setting, later, empty, 0)
-    ...     print(now.event.calm, now.event.fast_since, now.event.fast_until, step.work)
+    ...     print(
+    ...         now.event.calm, now.event.fast_since, now.event.fast_until, step.work
+    ...     )
     0 10.0 12.0 14.0
     0 10.0 12.0 21.0
     1 10.0 12.0 28.0

@@ -72,14 +72,21 @@ def _transfer(grid: Grid, slip_hat: Array, memory_sum: Array, tables: ExplicitTa
     >>> from types import FunctionType, SimpleNamespace
     >>> def by_numpy(transform, spectrum, field):
     ...     field[:] = np.fft.irfft(spectrum, field.size)
-    >>> plain = FunctionType(_transfer.py_func.__code__, globals() | {"backward": by_numpy})
+    >>> plain = FunctionType(
+    ...     _transfer.py_func.__code__, globals() | {"backward": by_numpy}
+    ... )
     >>> stiffness = np.array([[0.0, 2.0, 4.0], [0.0, 1.0, 3.0]])
-    >>> grid = SimpleNamespace(transform=None, offset=np.array([0, 0, 1]), stiffness=stiffness)
+    >>> grid = SimpleNamespace(
+    ...     transform=None, offset=np.array([0, 0, 1]), stiffness=stiffness
+    ... )
     >>> memory_sum = np.zeros(2 * ENTRIES)
     >>> memory_sum[[0, 1, ENTRIES]] = 0.3, -0.2, 0.6
     >>> tables = SimpleNamespace(
-    ...     step=0.1, slip_rate_hat=np.array([7.0, 2.0, 4.0]), response=np.array([9.0, 0.5, 0.25]),
-    ...     shared=np.ones(3, complex), transfer=np.zeros(4),
+    ...     step=0.1,
+    ...     slip_rate_hat=np.array([7.0, 2.0, 4.0]),
+    ...     response=np.array([9.0, 0.5, 0.25]),
+    ...     shared=np.ones(3, complex),
+    ...     transfer=np.zeros(4),
     ... )
     >>> plain(grid, np.array([5.0, 1.0, -2.0]), memory_sum, tables)
     >>> hat = np.fft.rfft(tables.transfer)
@@ -109,9 +116,15 @@ def _predict(
     >>> from types import FunctionType, SimpleNamespace
     >>> strength = {"node_strength": lambda setting, i, slip: 9.0 + i - 2.0 * slip}
     >>> plain = FunctionType(_predict.py_func.__code__, globals() | strength)
-    >>> nodes = SimpleNamespace(profile=np.array([2.0, 1.0]), initial=np.array([-3.0, 0.5]))
-    >>> state = SimpleNamespace(slip=np.array([0.5, 0.2]), slip_rate=np.array([2.0, 0.0]))
-    >>> tables = SimpleNamespace(transfer=np.array([1.0, -1.0]), step=0.1, predicted=np.zeros(2))
+    >>> nodes = SimpleNamespace(
+    ...     profile=np.array([2.0, 1.0]), initial=np.array([-3.0, 0.5])
+    ... )
+    >>> state = SimpleNamespace(
+    ...     slip=np.array([0.5, 0.2]), slip_rate=np.array([2.0, 0.0])
+    ... )
+    >>> tables = SimpleNamespace(
+    ...     transfer=np.array([1.0, -1.0]), step=0.1, predicted=np.zeros(2)
+    ... )
     >>> plain(state, SimpleNamespace(nodes=nodes), tables, 5.0, 4.0)
     >>> tables.predicted.round(9).tolist()
     [0.1, 0.0]
@@ -142,19 +155,32 @@ def _correct(
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS
     >>> strength = {"node_strength": lambda setting, i, slip: 9.0 + i - 2.0 * slip}
     >>> plain = FunctionType(_correct.py_func.__code__, globals() | strength)
-    >>> nodes = SimpleNamespace(profile=np.array([2.0, 1.0]), initial=np.array([-3.0, 0.5]))
+    >>> nodes = SimpleNamespace(
+    ...     profile=np.array([2.0, 1.0]), initial=np.array([-3.0, 0.5])
+    ... )
     >>> state = SimpleNamespace(
-    ...     slip=np.array([0.5, 0.2]), slip_rate=np.array([2.0, 0.0]), stress=np.zeros(2),
+    ...     slip=np.array([0.5, 0.2]),
+    ...     slip_rate=np.array([2.0, 0.0]),
+    ...     stress=np.zeros(2),
     ...     diagnostics=np.zeros(1, DIAGNOSTICS).view(np.recarray),
     ... )
     >>> state.diagnostics[0].step.load = 3.0
     >>> tables = SimpleNamespace(
-    ...     transfer=np.array([1.0, -1.0]), step=0.1, predicted=np.array([4.0, 0.0]),
-    ...     increments=np.zeros(2), strength=np.zeros(2),
+    ...     transfer=np.array([1.0, -1.0]),
+    ...     step=0.1,
+    ...     predicted=np.array([4.0, 0.0]),
+    ...     increments=np.zeros(2),
+    ...     strength=np.zeros(2),
     ... )
-    >>> np.round(plain(state, SimpleNamespace(nodes=nodes), tables, 5.0, 4.0), 9).tolist()
+    >>> np.round(
+    ...     plain(state, SimpleNamespace(nodes=nodes), tables, 5.0, 4.0), 9
+    ... ).tolist()
     [1.5, 0.15]
-    >>> state.slip.tolist(), state.slip_rate.round(9).tolist(), state.stress.round(9).tolist()
+    >>> (
+    ...     state.slip.tolist(),
+    ...     state.slip_rate.round(9).tolist(),
+    ...     state.stress.round(9).tolist(),
+    ... )
     ([0.8, 0.2], [0.15, 0.0], [7.4, 4.5])
     >>> tables.increments.round(9).tolist(), tables.strength.round(9).tolist()
     ([0.1075, 0.0], [7.4, 9.6])
@@ -193,9 +219,18 @@ def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise:
     >>> from types import SimpleNamespace
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS
     >>> now = np.zeros(1, DIAGNOSTICS).view(np.recarray)[0]
-    >>> thresholds = SimpleNamespace(calm_slip=0.1, slid_stop=True, breakable=5, calm_count=2)
+    >>> thresholds = SimpleNamespace(
+    ...     calm_slip=0.1, slid_stop=True, breakable=5, calm_count=2
+    ... )
     >>> now.run.scale, now.stepping.calm_slip_rate = 1e4, 9.6
-    >>> for top, weakened in ((0.79, 0), (19.0, 4), (0.81, 4), (40.0, 4), (51.0, 4), (90.0, 5)):
+    >>> for top, weakened in (
+    ...     (0.79, 0),
+    ...     (19.0, 4),
+    ...     (0.81, 4),
+    ...     (40.0, 4),
+    ...     (51.0, 4),
+    ...     (90.0, 5),
+    ... ):
     ...     now.step.top_slip_rate, now.step.weakened_nodes = top, weakened
     ...     calm = _calm.py_func(now, thresholds, 0.5, 2.0, 1.5)
     ...     print(bool(calm), now.stepping.calm_steps, now.stepping.calm_slip_rate)
@@ -234,13 +269,17 @@ def explicit_steps(
 
     >>> from types import FunctionType, SimpleNamespace
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS, PiecewiseLinear
-    >>> def taken(falls, calm, total=4.0, instabilities=0, weakened=0, open=1, **changed):
+    >>> def taken(
+    ...     falls, calm, total=4.0, instabilities=0, weakened=0, open=1, **changed
+    ... ):
     ...     def forward(transform, field, spectrum):
     ...         spectrum[:] = np.fft.rfft(field)
+    ...
     ...     def finish_step(state, setting, done, record, row):
     ...         kept.append([float(value) for value in done[:5]])
     ...         now.step.time, now.step.load = done.time, done.load
     ...         return falls[row]
+    ...
     ...     parts = {"_transfer", "pack", "advance_memory", "end_event", "_predict"}
     ...     names = globals() | {part: lambda *arguments: None for part in parts}
     ...     names |= {"forward": forward, "finish_step": finish_step}
@@ -248,32 +287,68 @@ def explicit_steps(
     ...     names["_calm"] = lambda *arguments: calm[len(kept) - 1]
     ...     kept, diagnostics = [], np.zeros(1, DIAGNOSTICS).view(np.recarray)
     ...     now = diagnostics[0]
-    ...     now.run.scale, now.event.open, now.results.instabilities = 1e4, open, instabilities
-    ...     now.step.weakened_nodes, now.step.time, now.step.load = weakened, 1.0, 2.0
-    ...     options = {"slid_stop": True, "held": False, "event_stop": False, "rest_stop": False}
-    ...     options |= {"breakable": 2, "period_nodes": 8, "explicit_only": False} | changed
-    ...     grid = SimpleNamespace(transform=None, offset=None, impedance=6.0, cell=0.25)
+    ...     now.run.scale, now.event.open, now.results.instabilities = (
+    ...         1e4,
+    ...         open,
+    ...         instabilities,
+    ...     )
+    ...     now.step.weakened_nodes, now.step.time, now.step.load = (
+    ...         weakened,
+    ...         1.0,
+    ...         2.0,
+    ...     )
+    ...     options = {
+    ...         "slid_stop": True,
+    ...         "held": False,
+    ...         "event_stop": False,
+    ...         "rest_stop": False,
+    ...     }
+    ...     options |= {
+    ...         "breakable": 2,
+    ...         "period_nodes": 8,
+    ...         "explicit_only": False,
+    ...     } | changed
+    ...     grid = SimpleNamespace(
+    ...         transform=None, offset=None, impedance=6.0, cell=0.25
+    ...     )
     ...     grid.poles, grid.multiplicity = np.zeros(1), 1
     ...     setting = SimpleNamespace(
-    ...         grid=grid, thresholds=SimpleNamespace(unstable_slip_rate=1.0, **options),
+    ...         grid=grid,
+    ...         thresholds=SimpleNamespace(unstable_slip_rate=1.0, **options),
     ...         load=PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, 2.0])),
     ...     )
     ...     state = SimpleNamespace(
-    ...         slip_hat=np.zeros(2, complex), slip_rate=np.array([1.0, 3.0]), memory=None,
-    ...         memory_sum=None, diagnostics=diagnostics,
+    ...         slip_hat=np.zeros(2, complex),
+    ...         slip_rate=np.array([1.0, 3.0]),
+    ...         memory=None,
+    ...         memory_sum=None,
+    ...         diagnostics=diagnostics,
     ...     )
     ...     tables = SimpleNamespace(
-    ...         step=0.5, slip_rate_hat=np.zeros(2, complex), shared=np.zeros(2, complex),
-    ...         predicted=np.array([3.0, 5.0]), packed=None, table=None, increments=None,
+    ...         step=0.5,
+    ...         slip_rate_hat=np.zeros(2, complex),
+    ...         shared=np.zeros(2, complex),
+    ...         predicted=np.array([3.0, 5.0]),
+    ...         packed=None,
+    ...         table=None,
+    ...         increments=None,
     ...         strength=None,
     ...     )
     ...     plain = FunctionType(explicit_steps.py_func.__code__, names)
     ...     count, reason = plain(3, state, setting, tables, None)
-    ...     return int(count), Reason(reason).name, kept, state.slip_hat.real.tolist(), now
+    ...     return (
+    ...         int(count),
+    ...         Reason(reason).name,
+    ...         kept,
+    ...         state.slip_hat.real.tolist(),
+    ...         now,
+    ...     )
     >>> rests = [False] * 3
     >>> taken([0.0, 0.0, 0.0], rests)[:2]
     (3, 'DONE')
-    >>> count, reason, kept, slip_hat, now = taken([0.9, 1.1, 0.0], rests, event_stop=True)
+    >>> count, reason, kept, slip_hat, now = taken(
+    ...     [0.9, 1.1, 0.0], rests, event_stop=True
+    ... )
     >>> count, reason, kept[1], slip_hat, int(now.stepping.explicit_steps)
     (2, 'DROPPED', [2.0, 0.5, 4.0, 0.75, 3.0], [6.0, -2.0], 2)
     >>> taken([0.0, 0.0, 0.0], rests, total=np.nan)[:2]
@@ -290,7 +365,11 @@ def explicit_steps(
     2 TO_IMPLICIT 0
     2 TO_IMPLICIT 1
     2 AT_REST 1
-    >>> for changed in ({}, {"held": True}, {"slid_stop": False, "explicit_only": True}):
+    >>> for changed in (
+    ...     {},
+    ...     {"held": True},
+    ...     {"slid_stop": False, "explicit_only": True},
+    ... ):
     ...     print(taken([0.0, 0.0, 0.0], calm, weakened=2, **changed)[:2])
     (1, 'ALL_SLID')
     (2, 'ALL_SLID')

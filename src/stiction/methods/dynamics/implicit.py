@@ -101,8 +101,14 @@ def _choose_size(now: Any, setting: Setting, step: float) -> Any:
     >>> now = SimpleNamespace(step=SimpleNamespace(time=1.0, load=2.0))
     >>> now.run = SimpleNamespace(scale=100.0)
     >>> def size(turning_times, **changed):
-    ...     options = {"load_step": 0.011, "smallest_step": 0.1, "end_time": 9.0} | changed
-    ...     setting = SimpleNamespace(load=load, turning_times=np.array(turning_times))
+    ...     options = {
+    ...         "load_step": 0.011,
+    ...         "smallest_step": 0.1,
+    ...         "end_time": 9.0,
+    ...     } | changed
+    ...     setting = SimpleNamespace(
+    ...         load=load, turning_times=np.array(turning_times)
+    ...     )
     ...     setting.thresholds = SimpleNamespace(**options)
     ...     size, step, clipped, last = _choose_size.py_func(now, setting, 2.0)
     ...     return round(float(size), 6), round(float(step), 6), clipped, bool(last)
@@ -155,28 +161,54 @@ def _assemble(
     ...     spectrum[:] = np.fft.rfft(field)
     >>> def backward(transform, spectrum, field):
     ...     field[:] = np.fft.irfft(spectrum, field.size)
-    >>> names = {"forward": forward, "backward": backward, "fading_memory": lambda *arguments: None}
-    >>> names |= globals() | names | {"tabulate": lambda grid, size, tables: tabulated.append(size)}
+    >>> names = {
+    ...     "forward": forward,
+    ...     "backward": backward,
+    ...     "fading_memory": lambda *arguments: None,
+    ... }
+    >>> names |= (
+    ...     globals()
+    ...     | names
+    ...     | {"tabulate": lambda grid, size, tables: tabulated.append(size)}
+    ... )
     >>> plain, tabulated = FunctionType(_assemble.py_func.__code__, names), []
     >>> stiffness = np.array([[0.0, 2.0, 5.0], [0.0, 1.0, 3.0]])
-    >>> grid = SimpleNamespace(transform=None, stiffness=stiffness, entry=np.array([0, 0, 1]))
+    >>> grid = SimpleNamespace(
+    ...     transform=None, stiffness=stiffness, entry=np.array([0, 0, 1])
+    ... )
     >>> grid.impedance = 4.0
     >>> problem = SimpleNamespace(
-    ...     symbol=np.zeros(3), inverse=np.zeros(3), work=np.zeros(3, complex), trial=np.zeros(4),
-    ...     increment=np.zeros(4), slipping=np.zeros(4, int),
+    ...     symbol=np.zeros(3),
+    ...     inverse=np.zeros(3),
+    ...     work=np.zeros(3, complex),
+    ...     trial=np.zeros(4),
+    ...     increment=np.zeros(4),
+    ...     slipping=np.zeros(4, int),
     ... )
     >>> tables = SimpleNamespace(
-    ...     problem=problem, response=np.array([0.1, 0.2]), ramp_response=np.array([0.05, -0.1]),
-    ...     past_hat=np.zeros(3, complex), memory_sum=np.array([0.0, 0.2 + 0.1j, 0.3]),
-    ...     filled=np.zeros(1, int), valid_for=np.zeros(2),
+    ...     problem=problem,
+    ...     response=np.array([0.1, 0.2]),
+    ...     ramp_response=np.array([0.05, -0.1]),
+    ...     past_hat=np.zeros(3, complex),
+    ...     memory_sum=np.array([0.0, 0.2 + 0.1j, 0.3]),
+    ...     filled=np.zeros(1, int),
+    ...     valid_for=np.zeros(2),
     ... )
     >>> state = SimpleNamespace(
-    ...     past=np.array([1.0, 2.0, 4.0, 2.0]), slip_hat=np.array([0.0, 0.5, -1.0]), memory=None,
-    ...     slip_rate=np.array([0.0, 0.1, 0.0, 0.2]), diagnostics=np.zeros(1, DIAGNOSTICS),
+    ...     past=np.array([1.0, 2.0, 4.0, 2.0]),
+    ...     slip_hat=np.array([0.0, 0.5, -1.0]),
+    ...     memory=None,
+    ...     slip_rate=np.array([0.0, 0.1, 0.0, 0.2]),
+    ...     diagnostics=np.zeros(1, DIAGNOSTICS),
     ... )
     >>> state.diagnostics = state.diagnostics.view(np.recarray)
-    >>> nodes = SimpleNamespace(profile=np.array([99.0, 2.0, 1.0, 1.0]), initial=np.full(4, 0.5))
-    >>> nodes.peak, setting = np.array([np.inf, 9.0, 9.0, 9.0]), SimpleNamespace(grid=grid)
+    >>> nodes = SimpleNamespace(
+    ...     profile=np.array([99.0, 2.0, 1.0, 1.0]), initial=np.full(4, 0.5)
+    ... )
+    >>> nodes.peak, setting = (
+    ...     np.array([np.inf, 9.0, 9.0, 9.0]),
+    ...     SimpleNamespace(grid=grid),
+    ... )
     >>> setting.nodes = nodes
     >>> accuracy = plain(state, setting, tables, _Attempt(0.5, 1.0, 3.0, 0.25, 1.0))
     >>> problem.symbol.round(9).tolist(), (1.0 / problem.inverse).round(9).tolist()
@@ -193,7 +225,12 @@ def _assemble(
     The tables serve further steps until the size or the ratio changes.
 
     >>> for size, ratio in ((0.5, 0.25), (0.5, 0.5), (0.25, 0.5)):
-    ...     _ = plain(state, setting, tables, _Attempt(size, 1.0, 3.0, ratio, 2.0 * ratio / size))
+    ...     _ = plain(
+    ...         state,
+    ...         setting,
+    ...         tables,
+    ...         _Attempt(size, 1.0, 3.0, ratio, 2.0 * ratio / size),
+    ...     )
     ...     print(tabulated, problem.symbol[0])
     [0.5] 10.0
     [0.5] 12.0
@@ -253,16 +290,28 @@ def _effect(state: RuptureState, setting: Setting, u: Array, attempt: _Attempt) 
 
     >>> from types import FunctionType, SimpleNamespace
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS
-    >>> strength = {"node_strength": lambda setting, i, slip: (6.0, 2.0, 1.0, 1.0)[i] - 2.0 * slip}
+    >>> strength = {
+    ...     "node_strength": lambda setting, i, slip: (
+    ...         (6.0, 2.0, 1.0, 1.0)[i] - 2.0 * slip
+    ...     )
+    ... }
     >>> plain = FunctionType(_effect.py_func.__code__, globals() | strength)
     >>> diagnostics = np.zeros(1, DIAGNOSTICS).view(np.recarray)
     >>> diagnostics[0].run.scale = 50.0
-    >>> peak, residual = np.array([10.0, 2.0, 5.0, 5.0, 1.0]), np.array([2.0, 1.0, 1.0, 1.0, 1.0])
+    >>> peak, residual = (
+    ...     np.array([10.0, 2.0, 5.0, 5.0, 1.0]),
+    ...     np.array([2.0, 1.0, 1.0, 1.0, 1.0]),
+    ... )
     >>> residual_slip = np.array([2.0, 2.0, 1.0, 2.0, 0.0])
-    >>> nodes = SimpleNamespace(peak=peak, residual=residual, residual_slip=residual_slip)
+    >>> nodes = SimpleNamespace(
+    ...     peak=peak, residual=residual, residual_slip=residual_slip
+    ... )
     >>> setting = SimpleNamespace(nodes=nodes, grid=SimpleNamespace(impedance=2.0))
     >>> setting.thresholds = SimpleNamespace(period_nodes=5)
-    >>> slip, past = np.array([0.5, 0.5, 1.0, 3.0, 1.0]), np.array([0.0, 0.0, 0.0, 2.0, 0.0])
+    >>> slip, past = (
+    ...     np.array([0.5, 0.5, 1.0, 3.0, 1.0]),
+    ...     np.array([0.0, 0.0, 0.0, 2.0, 0.0]),
+    ... )
     >>> state = SimpleNamespace(slip=slip, past=past, diagnostics=diagnostics)
     >>> attempt = _Attempt(2.0, 0.0, 0.0, 0.5, 0.0)
     >>> for u in ([1, 0, 0.3, 0, 0], [0, 0.5, 0.5, 0, 0], [0, 0.5, 0, 0.8, 0.9]):
@@ -299,13 +348,16 @@ def _accelerates(
 
     >>> from types import SimpleNamespace
     >>> now = SimpleNamespace(
-    ...     step=SimpleNamespace(load=7.0), run=SimpleNamespace(scale=1e6),
+    ...     step=SimpleNamespace(load=7.0),
+    ...     run=SimpleNamespace(scale=1e6),
     ...     stepping=SimpleNamespace(previous_radiated=0.2),
     ... )
     >>> thresholds = SimpleNamespace(smallest_step=0.1, slip_step=0.02)
     >>> def accelerates(radiated=0.27, load=7.6, size=0.2, largest=0.0, ratio=0.5):
     ...     attempt = _Attempt(size, 0.0, load, ratio, 0.0)
-    ...     return bool(_accelerates.py_func(now, thresholds, attempt, largest, radiated))
+    ...     return bool(
+    ...         _accelerates.py_func(now, thresholds, attempt, largest, radiated)
+    ...     )
     >>> accelerates(), accelerates(load=6.4), accelerates(size=0.19, largest=0.0021)
     (True, True, True)
     >>> accelerates(radiated=0.25), accelerates(load=7.4), accelerates(ratio=0.0)
@@ -350,35 +402,61 @@ def _accept(
     >>> names["advance_with_ramp"] = lambda *arguments: None
     >>> names["node_strength"] = lambda setting, i, slip: 9.0 + i - 2.0 * slip
     >>> plain = FunctionType(_accept.py_func.__code__, globals() | names)
-    >>> stiffness, entry = np.array([[0.0, 2.0, 5.0], [0.0, 1.0, 3.0]]), np.array([0, 0, 1])
+    >>> stiffness, entry = (
+    ...     np.array([[0.0, 2.0, 5.0], [0.0, 1.0, 3.0]]),
+    ...     np.array([0, 0, 1]),
+    ... )
     >>> grid = SimpleNamespace(transform=None, stiffness=stiffness, entry=entry)
     >>> grid.impedance, grid.cell = 4.0, 0.25
     >>> u, past = np.array([0.4, 0.0, 0.0, 0.0]), np.array([0.2, 0.6, 0.0, 0.0])
     >>> tables = SimpleNamespace(
-    ...     problem=SimpleNamespace(increment=u, work=np.zeros(3, complex)), transfer=np.zeros(4),
-    ...     slip_rate_hat=np.zeros(3, complex), slope_hat=np.zeros(3, complex),
-    ...     strength=np.zeros(4), response=np.array([0.1, 0.2]),
-    ...     ramp_response=np.array([0.05, -0.1]), memory_sum=np.array([0.0, 0.2, 0.3]),
+    ...     problem=SimpleNamespace(increment=u, work=np.zeros(3, complex)),
+    ...     transfer=np.zeros(4),
+    ...     slip_rate_hat=np.zeros(3, complex),
+    ...     slope_hat=np.zeros(3, complex),
+    ...     strength=np.zeros(4),
+    ...     response=np.array([0.1, 0.2]),
+    ...     ramp_response=np.array([0.05, -0.1]),
+    ...     memory_sum=np.array([0.0, 0.2, 0.3]),
     ...     past_hat=np.fft.rfft(past),
     ... )
     >>> state = SimpleNamespace(
-    ...     slip_hat=np.array([0.0, 0.5, -1.0], complex), memory=None,
-    ...     slip=np.array([1.0, 2.0, 0.0, 0.0]), slip_rate=np.zeros(4), past=past.copy(),
-    ...     stress=np.zeros(4), diagnostics=np.zeros(1, DIAGNOSTICS).view(np.recarray),
+    ...     slip_hat=np.array([0.0, 0.5, -1.0], complex),
+    ...     memory=None,
+    ...     slip=np.array([1.0, 2.0, 0.0, 0.0]),
+    ...     slip_rate=np.zeros(4),
+    ...     past=past.copy(),
+    ...     stress=np.zeros(4),
+    ...     diagnostics=np.zeros(1, DIAGNOSTICS).view(np.recarray),
     ... )
     >>> state.diagnostics[0].step.load = 1.0
-    >>> nodes = SimpleNamespace(profile=np.array([1.0, 2.0, 1.0, 1.0]), initial=np.full(4, 0.5))
+    >>> nodes = SimpleNamespace(
+    ...     profile=np.array([1.0, 2.0, 1.0, 1.0]), initial=np.full(4, 0.5)
+    ... )
     >>> setting = SimpleNamespace(grid=grid, nodes=nodes)
     >>> work = plain(state, setting, tables, _Attempt(0.5, 1.0, 3.0, 0.5, 2.0))
-    >>> print(f"{work:.6f}", state.slip.tolist(), state.slip_rate.round(9).tolist())  # 0.4 * 2.5/4
+    >>> print(
+    ...     f"{work:.6f}", state.slip.tolist(), state.slip_rate.round(9).tolist()
+    ... )  # 0.4 * 2.5/4
     0.250000 [1.4, 2.0, 0.0, 0.0] [1.1, 0.0, 0.0, 0.0]
     >>> state.past.tolist(), tables.strength[:2].round(9).tolist()
     ([0.8, 0.0, 0.0, 0.0], [6.2, 6.0])
     >>> V, a = np.fft.rfft(u / 0.5), 2.0 * np.fft.rfft(u / 0.5 - past)
-    >>> memory = tables.memory_sum + tables.response[entry] * V + tables.ramp_response[entry] * a
-    >>> hat = stiffness[1] * memory - stiffness[0] * (np.array([0.0, 0.5, -1.0]) + np.fft.rfft(u))
-    >>> stress = np.fft.irfft(hat, 4) + 3.0 * nodes.profile + 0.5 - 4.0 * state.slip_rate
-    >>> np.allclose(state.stress, stress), np.allclose(state.slip_hat, [0.4, 0.9, -0.6])
+    >>> memory = (
+    ...     tables.memory_sum
+    ...     + tables.response[entry] * V
+    ...     + tables.ramp_response[entry] * a
+    ... )
+    >>> hat = stiffness[1] * memory - stiffness[0] * (
+    ...     np.array([0.0, 0.5, -1.0]) + np.fft.rfft(u)
+    ... )
+    >>> stress = (
+    ...     np.fft.irfft(hat, 4) + 3.0 * nodes.profile + 0.5 - 4.0 * state.slip_rate
+    ... )
+    >>> (
+    ...     np.allclose(state.stress, stress),
+    ...     np.allclose(state.slip_hat, [0.4, 0.9, -0.6]),
+    ... )
     (True, True)
     """
     size, ratio, rise, load = attempt.size, attempt.ratio, attempt.rise, attempt.load
@@ -421,7 +499,10 @@ def _next_size(asked: float, size: float, largest: float, growing: bool) -> Any:
     allow a larger size, unless the slip rate grows.
 
     >>> following = _next_size.py_func
-    >>> sizes = [following(0.02, 1.0, most, False) for most in (0.021, 0.019, 0.013, 0.004)]
+    >>> sizes = [
+    ...     following(0.02, 1.0, most, False)
+    ...     for most in (0.021, 0.019, 0.013, 0.004)
+    ... ]
     >>> [round(float(size), 4) for size in sizes]
     [0.7071, 1.0, 1.4142, 2.0]
     >>> following(0.02, 1.0, 0.004, True), following(0.02, 9e19, 0.004, False)
@@ -454,38 +535,74 @@ def implicit_steps(
 
     >>> from types import FunctionType, SimpleNamespace
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS, PiecewiseLinear
-    >>> def taken(effects, fall=0.0, weakened=0, total=1.0, end_time=99.0, **changed):
+    >>> def taken(
+    ...     effects, fall=0.0, weakened=0, total=1.0, end_time=99.0, **changed
+    ... ):
     ...     def choose(now, setting, step):
     ...         tried.append(float(step))
     ...         last = now.step.time + step > end_time
     ...         return (end_time - now.step.time if last else step), step, last, last
+    ...
     ...     def accept(state, setting, tables, attempt):
     ...         ratios.append(round(float(attempt.ratio), 6))
     ...         return 3.0
+    ...
     ...     def finish_step(state, setting, done, record, row):
     ...         now.step.time, now.step.load = done.time, done.load
     ...         return fall
-    ...     tried, ratios, diagnostics = [], [], np.zeros(1, DIAGNOSTICS).view(np.recarray)
-    ...     names = {"_choose_size": choose, "_accept": accept, "finish_step": finish_step}
-    ...     names |= {"_next_size": _next_size.py_func, "_assemble": lambda *given: 0.0}
-    ...     names["solve_increment"] = lambda *given: effects[len(tried) - 1] is not None
+    ...
+    ...     tried, ratios, diagnostics = (
+    ...         [],
+    ...         [],
+    ...         np.zeros(1, DIAGNOSTICS).view(np.recarray),
+    ...     )
+    ...     names = {
+    ...         "_choose_size": choose,
+    ...         "_accept": accept,
+    ...         "finish_step": finish_step,
+    ...     }
+    ...     names |= {
+    ...         "_next_size": _next_size.py_func,
+    ...         "_assemble": lambda *given: 0.0,
+    ...     }
+    ...     names["solve_increment"] = lambda *given: (
+    ...         effects[len(tried) - 1] is not None
+    ...     )
     ...     names["_effect"] = lambda *given: (effects[len(tried) - 1], total, 0.0)
     ...     names["_accelerates"] = lambda *given: effects[len(tried) - 1] == 0.03
     ...     now, thresholds = diagnostics[0], {"slid_stop": True, "event_stop": True}
-    ...     thresholds |= {"breakable": 2, "end_time": end_time, "smallest_step": 0.3}
+    ...     thresholds |= {
+    ...         "breakable": 2,
+    ...         "end_time": end_time,
+    ...         "smallest_step": 0.3,
+    ...     }
     ...     thresholds |= {"slip_step": 0.02, "curved": False} | changed
-    ...     now.run.scale, now.stepping.next_size, now.step.weakened_nodes = 1e4, 1.0, weakened
+    ...     now.run.scale, now.stepping.next_size, now.step.weakened_nodes = (
+    ...         1e4,
+    ...         1.0,
+    ...         weakened,
+    ...     )
     ...     load = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, 2.0]))
-    ...     setting = SimpleNamespace(load=load, thresholds=SimpleNamespace(**thresholds))
+    ...     setting = SimpleNamespace(
+    ...         load=load, thresholds=SimpleNamespace(**thresholds)
+    ...     )
     ...     problem = SimpleNamespace(increment=np.zeros(2))
     ...     tables = SimpleNamespace(problem=problem, strength=None)
     ...     state = SimpleNamespace(diagnostics=diagnostics, slip=None)
     ...     plain = FunctionType(implicit_steps.py_func.__code__, globals() | names)
     ...     count, reason = plain(3, state, setting, tables, None)
-    ...     return int(count), Reason(reason).name, np.round(tried, 4).tolist(), ratios
+    ...     return (
+    ...         int(count),
+    ...         Reason(reason).name,
+    ...         np.round(tried, 4).tolist(),
+    ...         ratios,
+    ...     )
     >>> taken([0.021, 0.004, 0.019])
     (3, 'DONE', [1.0, 0.7071, 1.4142], [0.0, 0.414214, 0.666667])
-    >>> taken([0.041, 0.019, 0.019, 0.019]), taken([0.019, None, 0.019, 0.03, 0.019])[2]
+    >>> (
+    ...     taken([0.041, 0.019, 0.019, 0.019]),
+    ...     taken([0.019, None, 0.019, 0.03, 0.019])[2],
+    ... )
     ((3, 'DONE', [1.0, 0.5, 0.5, 0.5], [0.0, 0.5, 0.5]), [1.0, 1.0, 0.5, 0.5])
     >>> taken([None, None]), taken([0.019], total=np.nan)[:2]
     ((0, 'TO_EXPLICIT', [1.0, 0.5], []), (0, 'NOT_FINITE'))

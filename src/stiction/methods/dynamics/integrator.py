@@ -86,8 +86,12 @@ class Run:
         >>> from types import SimpleNamespace
         >>> from stiction.problem.interface import Interface
         >>> medium = SimpleNamespace(interface=Interface(0.8, 8))
-        >>> medium.grid = SimpleNamespace(stiffness=np.array([[0.0, 1.0, 2.0, 5.0, 7.0]]))
-        >>> nodes = SimpleNamespace(profile=np.linspace(1.0, 8.0, 8), initial=np.full(8, -1.0))
+        >>> medium.grid = SimpleNamespace(
+        ...     stiffness=np.array([[0.0, 1.0, 2.0, 5.0, 7.0]])
+        ... )
+        >>> nodes = SimpleNamespace(
+        ...     profile=np.linspace(1.0, 8.0, 8), initial=np.full(8, -1.0)
+        ... )
         >>> run = Run(medium, SimpleNamespace(nodes=nodes), "sliding", 1.0, 0.0)
         >>> slip_hat = np.fft.rfft(3.0 * np.cos(np.pi / 2.0 * np.arange(8)))
         >>> run.elastic_stress(slip_hat, 10.0)[:4].round(9).tolist()
@@ -105,7 +109,9 @@ class Run:
         >>> from types import SimpleNamespace
         >>> from stiction.problem.interface import Interface
         >>> medium = SimpleNamespace(interface=Interface(0.8, 8, extent=(0.2, 0.4)))
-        >>> Run(medium, None, "sliding", 1.0, 0.0).mean(np.arange(8.0) ** 2)  # (4 + 9 + 16)/3
+        >>> Run(medium, None, "sliding", 1.0, 0.0).mean(
+        ...     np.arange(8.0) ** 2
+        ... )  # (4 + 9 + 16)/3
         9.666666666666666
         """
         interface = self.medium.interface
@@ -116,9 +122,17 @@ class Run:
 
         >>> from types import SimpleNamespace
         >>> from stiction.problem.friction.parameters import Linear
-        >>> fields = {"peak": [5.0, 7.0], "residual": [1.0, 2.0], "weakening_rate": [2.0, 3.0]}
-        >>> nodes = SimpleNamespace(**{name: np.array(values) for name, values in fields.items()})
-        >>> run = Run(None, SimpleNamespace(nodes=nodes, law=Linear()), "sliding", 1.0, 0.0)
+        >>> fields = {
+        ...     "peak": [5.0, 7.0],
+        ...     "residual": [1.0, 2.0],
+        ...     "weakening_rate": [2.0, 3.0],
+        ... }
+        >>> nodes = SimpleNamespace(
+        ...     **{name: np.array(values) for name, values in fields.items()}
+        ... )
+        >>> run = Run(
+        ...     None, SimpleNamespace(nodes=nodes, law=Linear()), "sliding", 1.0, 0.0
+        ... )
         >>> run.strength_after(np.array([1.5, 2.0])).tolist()
         [2.0, 2.0]
         """
@@ -143,7 +157,9 @@ class Run:
         """Load at which the first node reaches its strength, before any slip, Pa.
 
         >>> from types import SimpleNamespace
-        >>> peak, initial, profile = np.array([[5.0, 9.0, 4.0], [1.0, 0.5, 2.0], [1.0, 5.0, 0.5]])
+        >>> peak, initial, profile = np.array(
+        ...     [[5.0, 9.0, 4.0], [1.0, 0.5, 2.0], [1.0, 5.0, 0.5]]
+        ... )
         >>> nodes = SimpleNamespace(peak=peak, initial=initial, profile=profile)
         >>> Run(None, SimpleNamespace(nodes=nodes), "sliding", 1.0, 0.0).first_load
         1.7
@@ -159,18 +175,24 @@ class Run:
 
         >>> from types import SimpleNamespace
         >>> from stiction.methods.dynamics.state import PiecewiseLinear
-        >>> times, values = np.array([0.0, 1.0, 2.0, 4.0]), np.array([0.5, 3.0, 2.0, 6.0])
+        >>> times, values = (
+        ...     np.array([0.0, 1.0, 2.0, 4.0]),
+        ...     np.array([0.5, 3.0, 2.0, 6.0]),
+        ... )
         >>> for first_load, pieces in ((0.4, 4), (2.5, 4), (3.5, 4), (8.0, 4), (4.0, 3)):
         ...     one = np.ones(1)
-        ...     nodes = SimpleNamespace(peak=first_load * one, initial=0.0 * one, profile=one)
+        ...     nodes = SimpleNamespace(
+        ...         peak=first_load * one, initial=0.0 * one, profile=one
+        ...     )
         ...     load = PiecewiseLinear(times[:pieces], values[:pieces])
         ...     setting = SimpleNamespace(nodes=nodes, load=load)
-        ...     print(Run(None, setting, "time", 1.0, 0.0).first_slip())
+        ...     time = Run(None, setting, "time", 1.0, 0.0).first_slip()
+        ...     print("never" if time is None else time)
         0.0
         0.8
         2.75
         5.0
-        None
+        never
         """
         (times, values), target = self.setting.load, self.first_load
         if values[0] >= target:
@@ -185,7 +207,9 @@ class Run:
 
         >>> from types import SimpleNamespace
         >>> from stiction.methods.dynamics.state import PiecewiseLinear
-        >>> load = PiecewiseLinear(np.array([0.0, 1.0, 2.0, 4.0]), np.array([0.5, 3.0, 2.0, 6.0]))
+        >>> load = PiecewiseLinear(
+        ...     np.array([0.0, 1.0, 2.0, 4.0]), np.array([0.5, 3.0, 2.0, 6.0])
+        ... )
         >>> run = Run(None, SimpleNamespace(load=load), "time", 1.0, 0.0)
         >>> [run.slope(time) for time in (0.0, 0.9, 1.0, 2.0, 9.0)]
         [2.5, 2.5, 1.0, 2.0, 2.0]
@@ -208,26 +232,55 @@ class Run:
         >>> from stiction.methods.dynamics.state import PiecewiseLinear
         >>> from stiction.problem.friction.parameters import Linear
         >>> from stiction.problem.interface import Interface
-        >>> grid = SimpleNamespace(frequency=np.ones(4), multiplicity=1, poles=np.zeros(2))
+        >>> grid = SimpleNamespace(
+        ...     frequency=np.ones(4), multiplicity=1, poles=np.zeros(2)
+        ... )
         >>> grid.stiffness = np.array([[0.0, 1.0, 2.0, 5.0, 7.0]])
-        >>> medium = SimpleNamespace(interface=Interface(0.8, 8), impedance=2.0, grid=grid)
+        >>> medium = SimpleNamespace(
+        ...     interface=Interface(0.8, 8), impedance=2.0, grid=grid
+        ... )
         >>> peak = np.array([5.0, 3.5, 6.0, 7.0, 4.0, 9.0, 9.0, 9.0])
-        >>> nodes = SimpleNamespace(peak=peak, residual=0.2 * peak, weakening_rate=np.full(8, 2.0))
-        >>> nodes.residual_slip, nodes.profile, nodes.initial = 0.4 * peak, np.ones(8), np.zeros(8)
-        >>> history = PiecewiseLinear(np.array([0.0, 0.5, 2.0]), np.array([0.0, 2.0, 8.0]))
-        >>> options = {"held": False, "period_nodes": 8, "front_share": 0.5, "smallest_step": 1e-6}
+        >>> nodes = SimpleNamespace(
+        ...     peak=peak, residual=0.2 * peak, weakening_rate=np.full(8, 2.0)
+        ... )
+        >>> nodes.residual_slip, nodes.profile, nodes.initial = (
+        ...     0.4 * peak,
+        ...     np.ones(8),
+        ...     np.zeros(8),
+        ... )
+        >>> history = PiecewiseLinear(
+        ...     np.array([0.0, 0.5, 2.0]), np.array([0.0, 2.0, 8.0])
+        ... )
+        >>> options = {
+        ...     "held": False,
+        ...     "period_nodes": 8,
+        ...     "front_share": 0.5,
+        ...     "smallest_step": 1e-6,
+        ... }
         >>> thresholds = SimpleNamespace(**options, load_step=1e-3, explicit_only=False)
         >>> setting = SimpleNamespace(nodes=nodes, load=history, scale=history)
         >>> setting.thresholds = thresholds
         >>> setting.law, setting.mean_initial, setting.mean_profile = Linear(), 0.0, 1.0
         >>> run = Run(medium, setting, "sliding", 1.0, 0.0)
         >>> state = run.start(1.0)
-        >>> state.slip_rate[:2].tolist(), state.stress[[0, 1, 4]].tolist(), state.explicit
+        >>> (
+        ...     state.slip_rate[:2].tolist(),
+        ...     state.stress[[0, 1, 4]].tolist(),
+        ...     state.explicit,
+        ... )
         ([0.0, 0.25], [4.0, 3.5, 4.0], True)
-        >>> step, maximum, of_run = (state.now[name] for name in ("step", "maximum", "run"))
-        >>> [float(step[name]) for name in ("time", "load", "whole_stress", "mean_stress")]
+        >>> step, maximum, of_run = (
+        ...     state.now[name] for name in ("step", "maximum", "run")
+        ... )
+        >>> [
+        ...     float(step[name])
+        ...     for name in ("time", "load", "whole_stress", "mean_stress")
+        ... ]
         [1.0, 4.0, 3.9375, 3.9375]
-        >>> [float(maximum[name]) for name in ("time", "stress", "breakable", "strength")]
+        >>> [
+        ...     float(maximum[name])
+        ...     for name in ("time", "stress", "breakable", "strength")
+        ... ]
         [1.0, 4.0, 4.0, 0.0625]
         >>> int(step["top_node"]), int(maximum["node"]), float(step["top_slip_rate"])
         (1, 1, 0.25)
@@ -243,7 +296,10 @@ class Run:
         >>> state = run.start(1.0, np.array([0.2, 0.1, 0.4, 0.9, 0.0, 0.0, 0.0, 0.0]))
         >>> np.isfinite(state.arrival).tolist(), int(state.now["step"]["weakened_nodes"])
         ([True, False, True, True, False, False, False, False], 2)
-        >>> [round(float(state.now["step"][name]), 9) for name in ("strength_change", "mean_slip")]
+        >>> [
+        ...     round(float(state.now["step"][name]), 9)
+        ...     for name in ("strength_change", "mean_slip")
+        ... ]
         [-0.4, 0.2]
         >>> state.explicit, round(float(state.now["stepping"]["next_size"]), 9)
         (False, 0.0004)
@@ -320,22 +376,32 @@ class Run:
 
         >>> from types import SimpleNamespace
         >>> from stiction.methods.dynamics.state import PiecewiseLinear
-        >>> history = PiecewiseLinear(np.array([0.0, 1.0, 2.0]), np.array([0.0, 3.0, 3.0]))
+        >>> history = PiecewiseLinear(
+        ...     np.array([0.0, 1.0, 2.0]), np.array([0.0, 3.0, 3.0])
+        ... )
         >>> thresholds = SimpleNamespace(held=False, end_time=9.0)
         >>> setting = SimpleNamespace(load=history, thresholds=thresholds)
         >>> medium = SimpleNamespace(step=0.1)
         >>> run, medium.impedance = Run(medium, setting, "sliding", 1.0, 0.0), 2.0
         >>> def ending(reason=Reason.DONE, time=3.0, rate=4e-9, explicit=False):
-        ...     state = SimpleNamespace(slip_rate=np.array([rate, 0.0]), explicit=explicit)
+        ...     state = SimpleNamespace(
+        ...         slip_rate=np.array([rate, 0.0]), explicit=explicit
+        ...     )
         ...     state.now = {"step": {"time": time}, "run": {"scale": 10.0}}
         ...     return run.ending(state, reason)
-        >>> [ending(reason) for reason in (Reason.ALL_SLID, Reason.DROPPED, Reason.AT_REST)]
+        >>> [
+        ...     ending(reason)
+        ...     for reason in (Reason.ALL_SLID, Reason.DROPPED, Reason.AT_REST)
+        ... ]
         ['sliding', 'onset', 'rest']
-        >>> ending(), ending(time=9.0), ending(time=1.9), ending(rate=6e-9), ending(explicit=True)
-        ('rest', 'time', None, None, None)
+        >>> ending(), ending(time=9.0)
+        ('rest', 'time')
+        >>> goes_on = {"time": 1.9}, {"rate": 6e-9}, {"explicit": True}
+        >>> [ending(**case) is None for case in goes_on]
+        [True, True, True]
         >>> run.stop, thresholds.held = "time", True
-        >>> ending(), ending(Reason.ALL_SLID)
-        (None, 'rest')
+        >>> ending() is None, ending(Reason.ALL_SLID)
+        (True, 'rest')
         """
         if reason == Reason.ALL_SLID and self.setting.thresholds.held:
             return "rest"
@@ -364,15 +430,21 @@ class Run:
         ...     def take_steps(self, state, count):
         ...         counts.append(count)
         ...         state.now["stepping"]["implicit_steps"] += count
-        ...         return count, Reason.NOT_FINITE if state.steps >= 3600 else Reason.DONE
+        ...         return (
+        ...             count,
+        ...             Reason.NOT_FINITE if state.steps >= 3600 else Reason.DONE,
+        ...         )
+        ...
         ...     def ending(self, state, reason):
         ...         return "sliding" if 2500 <= state.steps < 3000 else None
         >>> state = RuptureState(*[np.zeros(0)] * 10, np.zeros(1, DIAGNOSTICS))
         >>> run, counts = Scripted(None, None, "sliding", 1.0, 0.0), []
-        >>> run.run_to_end(state, 1500), counts
-        ((None, <Reason.DONE: 0>), [1000, 500])
-        >>> run.run_to_end(state, 9000), run.run_to_end(state, 9000)[0], counts
-        (('sliding', <Reason.DONE: 0>), None, [1000, 500, 1000, 1000, 1000])
+        >>> for most in (1500, 9000, 9000):
+        ...     ending, reason = run.run_to_end(state, most)
+        ...     print(ending or "goes on", reason.name, counts)
+        goes on DONE [1000, 500]
+        sliding DONE [1000, 500, 1000]
+        goes on NOT_FINITE [1000, 500, 1000, 1000, 1000]
         """
         ending, reason = None, int(Reason.DONE)
         while ending is None and reason != Reason.NOT_FINITE and state.steps < max_steps:
@@ -399,19 +471,27 @@ class Run:
         ...         state.now["event"]["begun"] = len(script) == 2
         ...         called.append((state.explicit, count))
         ...         return script.pop(0)
+        ...
         ...     def _to_explicit(self, state):
         ...         state.now["stepping"]["phase"] = Phase.EXPLICIT
+        ...
         ...     def _to_implicit(self, state):
         ...         state.now["stepping"]["phase"] = Phase.IMPLICIT
+        ...
         ...     def _follow_event(self, state, rests):
         ...         called.append(rests)
         ...         state.now["event"]["begun"] = state.now["event"]["calm"] = 0
+        ...
         ...     _explicit = _implicit
         >>> thresholds = SimpleNamespace(held=True, end_time=9.0)
         >>> setting, called = SimpleNamespace(thresholds=thresholds), []
         >>> run = Scripted(SimpleNamespace(step=0.1), setting, "sliding", 1.0, 0.0)
         >>> state = RuptureState(*[np.zeros(0)] * 10, np.zeros(1, DIAGNOSTICS))
-        >>> script = [(3, Reason.TO_EXPLICIT), (4, Reason.TO_IMPLICIT), (5, Reason.ALL_SLID)]
+        >>> script = [
+        ...     (3, Reason.TO_EXPLICIT),
+        ...     (4, Reason.TO_IMPLICIT),
+        ...     (5, Reason.ALL_SLID),
+        ... ]
         >>> taken, reason = run.take_steps(state, 20)
         >>> taken, reason.name, called
         (12, 'ALL_SLID', [(False, 20), (True, 17), False, (False, 13), True])
@@ -456,18 +536,36 @@ class Run:
         >>> state, kept = RuptureState(*np.zeros((10, 2)), np.zeros(1, DIAGNOSTICS)), []
         >>> run, now = Scripted(None, None, "sliding", 1.0, 0.0), state.now
         >>> state.slip[:], state.maximum_slip[:] = (0.5, 0.25), (0.1, 0.2)
-        >>> now["maximum"]["time"], now["maximum"]["work"], now["step"]["work"] = 1.0, 3.0, 7.0
-        >>> now["maximum"]["node"], now["step"]["time"], now["event"]["begun"] = 1, 2.0, 1
+        >>> now["maximum"]["time"], now["maximum"]["work"], now["step"]["work"] = (
+        ...     1.0,
+        ...     3.0,
+        ...     7.0,
+        ... )
+        >>> now["maximum"]["node"], now["step"]["time"], now["event"]["begun"] = (
+        ...     1,
+        ...     2.0,
+        ...     1,
+        ... )
         >>> run._follow_event(state, rests=False)
         >>> kept, state.event_slip.tolist()
         ([([0.1, 0.2], 3.0)], [0.1, 0.2])
-        >>> [float(now["event"][name]) for name in ("open", "begun", "time", "work", "node")]
+        >>> [
+        ...     float(now["event"][name])
+        ...     for name in ("open", "begun", "time", "work", "node")
+        ... ]
         [1.0, 0.0, 1.0, 3.0, 1.0]
-        >>> now["maximum"]["time"], now["event"]["calm"], now["event"]["fast"] = 2.0, 1, 1
+        >>> now["maximum"]["time"], now["event"]["calm"], now["event"]["fast"] = (
+        ...     2.0,
+        ...     1,
+        ...     1,
+        ... )
         >>> run._follow_event(state, rests=True)
         >>> kept[1], state.event_slip.tolist(), state.maximum_slip.tolist()
         (([0.5, 0.25], 7.0), [0.5, 0.25], [0.5, 0.25])
-        >>> [float(now["event"][name]) for name in ("open", "calm", "fast", "time", "work")]
+        >>> [
+        ...     float(now["event"][name])
+        ...     for name in ("open", "calm", "fast", "time", "work")
+        ... ]
         [0.0, 0.0, 0.0, 2.0, 7.0]
         """
         now, event = state.now, state.now["event"]
@@ -495,7 +593,11 @@ class Run:
         >>> state = RuptureState(*np.zeros((10, 2)), np.zeros(1, DIAGNOSTICS))
         >>> end = np.zeros((), STEP)
         >>> end["load"], end["work"] = 8.0, 9.0
-        >>> begun, state.slip[:], state.event_slip[:] = state.now["event"], (0.5, 0.25), (0.1, 0.2)
+        >>> begun, state.slip[:], state.event_slip[:] = (
+        ...     state.now["event"],
+        ...     (0.5, 0.25),
+        ...     (0.1, 0.2),
+        ... )
         >>> begun["open"], begun["fast"], begun["node"], begun["time"] = 1, 1, 1, 1.0
         >>> begun["fast_since"], begun["fast_until"] = 3.0, 7.0
         >>> begun["load"], begun["work"] = 2.0, 4.0
@@ -511,8 +613,8 @@ class Run:
         one. Without fast slip there is no event.
 
         >>> state.now["results"]["all_broken"] = 1
-        >>> run._keep_event(state, state.slip, end), run._keep_event(state, state.slip.copy(), end)
-        (None, None)
+        >>> for slip in (state.slip, state.slip.copy()):
+        ...     run._keep_event(state, slip, end)
         >>> state.now["step"]["top_slip_rate"] = 0.4
         >>> run._keep_event(state, state.slip, end)
         >>> begun["fast"] = 0
@@ -548,9 +650,13 @@ class Run:
         """At most 3 steps of 0.1 s are left, and at least one is taken.
 
         >>> from types import FunctionType, SimpleNamespace
-        >>> names = globals() | {"explicit_steps": lambda count, *others: (count, Reason.DONE)}
+        >>> names = globals() | {
+        ...     "explicit_steps": lambda count, *others: (count, Reason.DONE)
+        ... }
         >>> plain = FunctionType(Run._explicit.__code__, names)
-        >>> run = SimpleNamespace(medium=SimpleNamespace(step=0.1), _explicit_tables=lambda: None)
+        >>> run = SimpleNamespace(
+        ...     medium=SimpleNamespace(step=0.1), _explicit_tables=lambda: None
+        ... )
         >>> run.setting = SimpleNamespace(thresholds=SimpleNamespace(end_time=1.0))
         >>> for time in (0.0, 0.72, 0.7 + 1e-9, 1.0):
         ...     state = SimpleNamespace(now={"step": {"time": time}})
@@ -593,13 +699,18 @@ class Run:
         >>> names = globals() | {"to_implicit": lambda *arguments: None}
         >>> plain = FunctionType(Run._to_implicit.__code__, names)
         >>> thresholds = SimpleNamespace(smallest_step=0.3, period_nodes=4)
-        >>> run = SimpleNamespace(medium=SimpleNamespace(grid=None, step=0.1, impedance=2.0))
+        >>> run = SimpleNamespace(
+        ...     medium=SimpleNamespace(grid=None, step=0.1, impedance=2.0)
+        ... )
         >>> run.setting = SimpleNamespace(thresholds=thresholds)
         >>> state = RuptureState(*np.zeros((10, 3)), np.ones(1, DIAGNOSTICS))
         >>> state.slip_rate[:] = 1.0, 2.0, 5.0
         >>> plain(run, state)
         >>> stepping = state.now["stepping"]
-        >>> state.past.tolist(), *map(float, stepping[["next_size", "previous_radiated"]])
+        >>> (
+        ...     state.past.tolist(),
+        ...     *map(float, stepping[["next_size", "previous_radiated"]]),
+        ... )
         ([1.0, 2.0, 5.0], 0.6, 4.0)
         >>> int(stepping["two_step"])
         0

@@ -121,14 +121,26 @@ def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
     kernels, and the first split pairs belong to mode II.
 
     >>> from types import SimpleNamespace
-    >>> kernels = [ExponentialSum(np.array([p]), np.array([2.0 * p]), 0.0) for p in (1.0, 2.0)]
+    >>> kernels = [
+    ...     ExponentialSum(np.array([p]), np.array([2.0 * p]), 0.0)
+    ...     for p in (1.0, 2.0)
+    ... ]
     >>> solid = SimpleNamespace(shear_modulus=6.0, shear_wave_speed=1.5)
-    >>> for interface in (Interface(np.pi, 8), Interface((np.pi, 2.0 * np.pi), (8, 8))):
+    >>> for interface in (
+    ...     Interface(np.pi, 8),
+    ...     Interface((np.pi, 2.0 * np.pi), (8, 8)),
+    ... ):
     ...     symbol = lambda shape: 5.0 * interface.wavenumbers
     ...     problem = SimpleNamespace(solid=solid, interface=interface)
     ...     problem.half_spaces = SimpleNamespace(symbol=symbol)
     ...     grid = _grid(problem, kernels[: 1 + interface.is_plane])
-    ...     print(grid.impedance, round(grid.cell, 6), grid.multiplicity, grid.split, end=" ")
+    ...     print(
+    ...         grid.impedance,
+    ...         round(grid.cell, 6),
+    ...         grid.multiplicity,
+    ...         grid.split,
+    ...         end=" ",
+    ...     )
     ...     print(grid.weights.tolist(), grid.stiffness[:, 1].tolist())
     ...     print(grid.frequency[:3].tolist(), grid.mode_two[:3].tolist())
     2.0 0.392699 1 1 [2.0] [10.0, 6.0]
@@ -241,9 +253,12 @@ def _largest_kappa(kernel: ExponentialSum, stiffness: float) -> float:
     which is at most 1 for x = 2. A growing memory is never stable.
 
     >>> nothing, growing = (
-    ...     ExponentialSum(np.array([pole + 0j]), np.zeros(1) + 0j, 0.0) for pole in (-1.0, 1.0)
+    ...     ExponentialSum(np.array([pole + 0j]), np.zeros(1) + 0j, 0.0)
+    ...     for pole in (-1.0, 1.0)
     ... )
-    >>> print(f"{_largest_kappa(nothing, 2.0):.3f} {_largest_kappa(nothing, 0.8):.3f}")
+    >>> print(
+    ...     f"{_largest_kappa(nothing, 2.0):.3f} {_largest_kappa(nothing, 0.8):.3f}"
+    ... )
     1.000 2.500
     >>> _largest_kappa(growing, 2.0)
     0.0
@@ -265,7 +280,9 @@ def _mixed(kernels: list[ExponentialSum], share: float) -> ExponentialSum:
     """Return the kernel for a wave vector on a plane, with the fraction (kx/k)² of mode II.
 
     >>> kernels = [ExponentialSum(np.array([-1.0]), np.array([8.0]), 0.1)]
-    >>> kernels.append(ExponentialSum(np.array([-2.0, -3.0]), np.array([4.0, 12.0]), 0.3))
+    >>> kernels.append(
+    ...     ExponentialSum(np.array([-2.0, -3.0]), np.array([4.0, 12.0]), 0.3)
+    ... )
     >>> mixed = _mixed(kernels, 0.25)
     >>> mixed.poles.tolist(), mixed.weights.tolist(), mixed.error
     ([-1.0, -2.0, -3.0], [2.0, 3.0, 9.0], 0.3)

@@ -71,7 +71,15 @@ next steps end with S = 1/4 + 1/2 = 3/4, and S = 3/8 + 1/2 = 7/8:
 >>> import numba
 >>> from stiction.elasticity.operator import make_transform
 >>> unit, (entry, offset, multiplicity) = np.ones(1), offsets((2,))
->>> constants = make_transform((2,)), 1.0, 1.0, np.zeros((2, 2)), entry, offset, multiplicity
+>>> constants = (
+...     make_transform((2,)),
+...     1.0,
+...     1.0,
+...     np.zeros((2, 2)),
+...     entry,
+...     offset,
+...     multiplicity,
+... )
 >>> grid = Grid(*constants, unit, unit, -unit + 0j, unit + 0j, 1)
 >>> table, response = step_table(grid, np.log(2.0))
 >>> y, memory_sum = empty_memory(grid)
@@ -116,7 +124,10 @@ def phi(z: Spectrum) -> Spectrum:
     """Return (exp(z) - 1)/z, also for small z.
 
     >>> z = np.array([9e-4, 1.1e-3, -0.5, 2j])
-    >>> bool(np.abs(phi(z) - np.expm1(z) / z).max() < 1e-15), phi(np.zeros(1)).tolist()
+    >>> (
+    ...     bool(np.abs(phi(z) - np.expm1(z) / z).max() < 1e-15),
+    ...     phi(np.zeros(1)).tolist(),
+    ... )
     (True, [1.0])
     """
     small = np.abs(z) < 1e-3
@@ -133,7 +144,10 @@ def offsets(half: tuple[int, ...]) -> tuple[Ints, Ints, int]:
     opposite of row 1, and comes after 128 numbers. Entry 79 is number 15 in
     the second block.
 
-    >>> [part.tolist() for part in offsets((4,))[:2]], offsets((70,))[1][[64, 65, 69]].tolist()
+    >>> (
+    ...     [part.tolist() for part in offsets((4,))[:2]],
+    ...     offsets((70,))[1][[64, 65, 69]].tolist(),
+    ... )
     ([[0, 0, 1, 2], [0, 0, 1, 2]], [63, 128, 132])
     >>> entry, offset, multiplicity = offsets((4, 3))
     >>> entry.tolist(), multiplicity
@@ -191,7 +205,11 @@ def work_arrays(count: int, size: int, kind: type) -> list[NDArray[Any]]:
     grids with a power of two nodes, steps would take 50 % longer.
 
     >>> first, second, third = work_arrays(3, 433, float)
-    >>> third.size, (second.ctypes.data - first.ctypes.data) // 8, third.ctypes.data % 64
+    >>> (
+    ...     third.size,
+    ...     (second.ctypes.data - first.ctypes.data) // 8,
+    ...     third.ctypes.data % 64,
+    ... )
     (433, 520, 0)
     """
     distance = -(-size // 8) * 8 + 80
@@ -206,7 +224,9 @@ def empty_memory(grid: Grid) -> tuple[Floats, Floats]:
     rows for each of three pairs.
 
     >>> from types import SimpleNamespace
-    >>> grid = SimpleNamespace(frequency=np.zeros(65), multiplicity=2, poles=np.zeros(3))
+    >>> grid = SimpleNamespace(
+    ...     frequency=np.zeros(65), multiplicity=2, poles=np.zeros(3)
+    ... )
     >>> [array.size for array in empty_memory(grid)]
     [3072, 512]
     """
@@ -222,17 +242,27 @@ def step_table(grid: Grid, step: float) -> tuple[Floats, Floats]:
 
     >>> from types import SimpleNamespace
     >>> grid = SimpleNamespace(
-    ...     poles=np.array([-0.5 + 1j, -2.0 - 1j]), weights=np.array([3.0 + 1j, 2.0 - 1j]), split=1,
-    ...     frequency=np.array([0.3, 2.0]), mode_two=np.array([1.0, 0.25]),
+    ...     poles=np.array([-0.5 + 1j, -2.0 - 1j]),
+    ...     weights=np.array([3.0 + 1j, 2.0 - 1j]),
+    ...     split=1,
+    ...     frequency=np.array([0.3, 2.0]),
+    ...     mode_two=np.array([1.0, 0.25]),
     ...     entry=np.array([1, 0, 1]),
     ... )
     >>> table, response = step_table(grid, 0.5)
     >>> z = grid.poles * 2.0 * 0.5
-    >>> E, B, w = np.exp(z), 0.5 * (np.exp(z) - 1.0) / z, grid.weights * np.array([0.25, 0.75])
+    >>> E, B, w = (
+    ...     np.exp(z),
+    ...     0.5 * (np.exp(z) - 1.0) / z,
+    ...     grid.weights * np.array([0.25, 0.75]),
+    ... )
     >>> rows = table.reshape(2, 4, ENTRIES)[:, :, 1]
     >>> np.allclose(rows.T, [E.real, E.imag, (w * E * B).real, (w * E * B).imag])
     True
-    >>> bool(response[0] == response[2]), np.allclose(response[0], (w * B).real.sum())
+    >>> (
+    ...     bool(response[0] == response[2]),
+    ...     np.allclose(response[0], (w * B).real.sum()),
+    ... )
     (True, True)
     >>> first = (3.0 + 1j) * np.expm1(0.15 * grid.poles[0]) / 0.3 / grid.poles[0]
     >>> np.allclose(response[1], first.real)  # all of mode II
@@ -260,7 +290,9 @@ def explicit_tables(grid: Grid, step: float, table: Floats, response: Floats) ->
     """Return the tables from `step_table`, with work arrays for a run.
 
     >>> from types import SimpleNamespace
-    >>> grid = SimpleNamespace(entry=np.zeros(9), frequency=np.zeros(8), multiplicity=2)
+    >>> grid = SimpleNamespace(
+    ...     entry=np.zeros(9), frequency=np.zeros(8), multiplicity=2
+    ... )
     >>> grid.transform = SimpleNamespace(shape=(4, 4))
     >>> tables = explicit_tables(grid, 0.5, np.zeros(5), np.zeros(9))
     >>> tables.step, tables.table.size, tables.response.size, tables.packed.size
@@ -301,12 +333,19 @@ def advance_memory(
     With complex numbers and two copies, for two pairs:
 
     >>> random = np.random.default_rng(1)
-    >>> table, memory = (random.normal(size=(*n, ENTRIES)) for n in ((1, 2, 4), (2, 2, 2, 2)))
+    >>> table, memory = (
+    ...     random.normal(size=(*n, ENTRIES)) for n in ((1, 2, 4), (2, 2, 2, 2))
+    ... )
     >>> V, total = random.normal(size=(2, 2, ENTRIES)), np.zeros((2, 2, ENTRIES))
-    >>> E, wEB = table[0, :, 0] + 1j * table[0, :, 1], table[0, :, 2] + 1j * table[0, :, 3]
+    >>> E, wEB = (
+    ...     table[0, :, 0] + 1j * table[0, :, 1],
+    ...     table[0, :, 2] + 1j * table[0, :, 3],
+    ... )
     >>> y = memory[..., 0, :] + 1j * memory[..., 1, :]  # (copy, pair, signal, entry)
     >>> y = E[:, None] * y + V[:, None]
-    >>> advance_memory.py_func(memory.ravel(), table.ravel(), V.ravel(), total.reshape(-1), 2, 2)
+    >>> advance_memory.py_func(
+    ...     memory.ravel(), table.ravel(), V.ravel(), total.reshape(-1), 2, 2
+    ... )
     >>> np.allclose(memory[..., 0, :] + 1j * memory[..., 1, :], y)
     True
     >>> np.allclose(total, (wEB[:, None] * y).sum(axis=1).real)
@@ -360,7 +399,9 @@ def to_explicit(
     >>> from types import SimpleNamespace
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS
     >>> unit = np.ones(1)
-    >>> grid = SimpleNamespace(frequency=unit, multiplicity=1, poles=-unit + 0j, weights=unit + 0j)
+    >>> grid = SimpleNamespace(
+    ...     frequency=unit, multiplicity=1, poles=-unit + 0j, weights=unit + 0j
+    ... )
     >>> grid.mode_two, grid.split, grid.entry = unit, 1, np.zeros(2, int)
     >>> table, _ = step_table(grid, np.log(2.0))
     >>> memory, total = empty_memory(grid)
@@ -373,7 +414,10 @@ def to_explicit(
     >>> int(now["stepping"]["phase"]) == Phase.EXPLICIT
     True
     >>> to_implicit(grid, state, np.log(2.0))
-    >>> memory[::ENTRIES].round(9).tolist(), int(now["stepping"]["phase"]) == Phase.IMPLICIT
+    >>> (
+    ...     memory[::ENTRIES].round(9).tolist(),
+    ...     int(now["stepping"]["phase"]) == Phase.IMPLICIT,
+    ... )
     ([1.0, 2.0, 4.0, -2.0], True)
     """
     _scale_memory(grid, state.memory, step, divide=True)
@@ -401,10 +445,15 @@ def _scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> N
     >>> grid = SimpleNamespace(frequency=np.linspace(0.1, 6.5, 65), multiplicity=2)
     >>> grid.poles = np.array([-0.5 + 1j, -2.0 - 1j])
     >>> memory = np.arange(2.0 * 2 * 2 * 4 * ENTRIES)
-    >>> y = memory.copy().reshape(2, 2, 2, 2, 2, ENTRIES)  # block, copy, pair, signal, part
+    >>> y = memory.copy().reshape(
+    ...     2, 2, 2, 2, 2, ENTRIES
+    ... )  # block, copy, pair, signal, part
     >>> _scale_memory(grid, memory, 0.5, divide=False)
     >>> z = grid.poles[:, None] * 6.5 * 0.5  # of entry 64, the first of block 1
-    >>> B, before = 0.5 * (np.exp(z) - 1.0) / z, y[1, ..., 0, 0] + 1j * y[1, ..., 1, 0]
+    >>> B, before = (
+    ...     0.5 * (np.exp(z) - 1.0) / z,
+    ...     y[1, ..., 0, 0] + 1j * y[1, ..., 1, 0],
+    ... )
     >>> after = memory.reshape(y.shape)[1, ..., 0]
     >>> np.allclose(after[..., 0] + 1j * after[..., 1], B * before)
     True
@@ -430,7 +479,9 @@ def _phi(z: Any) -> Any:
     """Return (exp(z) - 1)/z near z = 0, by a series.
 
     >>> z = 0.1 - 0.05j
-    >>> print(f"{abs(_phi.py_func(z) - np.expm1(z) / z):.7f} {_phi.py_func(1.0 + 0j).real:.5f}")
+    >>> print(
+    ...     f"{abs(_phi.py_func(z) - np.expm1(z) / z):.7f} {_phi.py_func(1.0 + 0j).real:.5f}"
+    ... )
     0.0000000 1.71806
     """
     value = 1.0 + 0.0j
@@ -444,7 +495,10 @@ def _ramp(z: Any) -> Any:
     """Return int_0^1 exp(z (1 - t)) (t - 1/2) dt near z = 0, by a series.
 
     >>> z, t = 0.1 - 0.05j, (np.arange(1000) + 0.5) / 1000
-    >>> value, integral = _ramp.py_func(z), np.mean(np.exp(z * (1.0 - t)) * (t - 0.5))
+    >>> value, integral = (
+    ...     _ramp.py_func(z),
+    ...     np.mean(np.exp(z * (1.0 - t)) * (t - 0.5)),
+    ... )
     >>> print(f"{abs(value - integral):.7f}")
     0.0000000
     """
@@ -455,14 +509,20 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
     """Return tables that are not yet valid for any step.
 
     >>> from types import SimpleNamespace
-    >>> grid = SimpleNamespace(entry=np.zeros(9), frequency=np.zeros(8), multiplicity=2)
+    >>> grid = SimpleNamespace(
+    ...     entry=np.zeros(9), frequency=np.zeros(8), multiplicity=2
+    ... )
     >>> grid.transform, grid.poles = SimpleNamespace(shape=(4, 4)), np.zeros(3)
     >>> tables = implicit_tables(grid)
     >>> tables.table.size, tables.ramp.size, tables.packed.size, tables.response.size
     (768, 384, 256, 8)
     >>> tables.memory_sum.size, tables.transfer.size, tables.problem.symbol.size
     (9, 16, 9)
-    >>> tables.problem.slipping.dtype.kind, tables.problem.work.size, int(tables.filled[0])
+    >>> (
+    ...     tables.problem.slipping.dtype.kind,
+    ...     tables.problem.work.size,
+    ...     int(tables.filled[0]),
+    ... )
     ('i', 9, 0)
     """
     count, pairs, entries = blocks(grid.frequency.size), grid.poles.size, grid.frequency.size
@@ -499,26 +559,46 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
     >>> from types import FunctionType, SimpleNamespace
     >>> names = globals() | {"_phi": _phi.py_func, "_ramp": _ramp.py_func}
     >>> plain, h = FunctionType(tabulate.py_func.__code__, names), 0.5
-    >>> poles, weights = np.array([-0.5 + 1j, -2.0 - 1j]), np.array([3.0 + 1j, 2.0 - 1j])
+    >>> poles, weights = (
+    ...     np.array([-0.5 + 1j, -2.0 - 1j]),
+    ...     np.array([3.0 + 1j, 2.0 - 1j]),
+    ... )
     >>> line = (1, np.array([0.03, 0.06, 0.09]), np.ones(3), 2)
     >>> plane = (2, np.array([0.0, 2.0, 5.0]), np.array([0.3, 0.6, 0.9]), 1)
     >>> for multiplicity, frequency, mode_two, split in (line, plane):
-    ...     grid = SimpleNamespace(multiplicity=multiplicity, frequency=frequency, poles=poles)
+    ...     grid = SimpleNamespace(
+    ...         multiplicity=multiplicity, frequency=frequency, poles=poles
+    ...     )
     ...     grid.weights, grid.mode_two, grid.split = weights, mode_two, split
-    ...     tables = SimpleNamespace(table=np.zeros(2 * FOUR_ROWS), ramp=np.zeros(2 * TWO_ROWS))
+    ...     tables = SimpleNamespace(
+    ...         table=np.zeros(2 * FOUR_ROWS), ramp=np.zeros(2 * TWO_ROWS)
+    ...     )
     ...     tables.response, tables.ramp_response = np.full((2, 3), 9.0)
     ...     plain(grid, h, tables)
-    ...     z, t = np.multiply.outer(poles, frequency) * h, (np.arange(2000) + 0.5) / 2000
+    ...     z, t = (
+    ...         np.multiply.outer(poles, frequency) * h,
+    ...         (np.arange(2000) + 0.5) / 2000,
+    ...     )
     ...     E, B = np.exp(z), h * phi(z)
-    ...     R = h * h * np.mean(np.exp(z[..., None] * (1.0 - t)) * (t - 0.5), axis=-1)
-    ...     rows, ramps = tables.table.reshape(2, 4, ENTRIES), tables.ramp.reshape(2, 2, ENTRIES)
+    ...     R = (
+    ...         h
+    ...         * h
+    ...         * np.mean(np.exp(z[..., None] * (1.0 - t)) * (t - 0.5), axis=-1)
+    ...     )
+    ...     rows, ramps = (
+    ...         tables.table.reshape(2, 4, ENTRIES),
+    ...         tables.ramp.reshape(2, 2, ENTRIES),
+    ...     )
     ...     found = rows[:, 0] + 1j * rows[:, 1], rows[:, 2] + 1j * rows[:, 3]
     ...     found = *found, ramps[:, 0] + 1j * ramps[:, 1]
     ...     pairs = zip(found, (E, B, R), strict=True)
     ...     print([bool(np.abs(x[:, :3] - y).max() < 1e-7) for x, y in pairs])
     ...     share = np.array([mode_two, mode_two if split == 2 else 1.0 - mode_two])
     ...     sums = [(weights[:, None] * share * x).real.sum(axis=0) for x in (B, R)]
-    ...     away = np.abs(tables.response - sums[0]), np.abs(tables.ramp_response - sums[1])
+    ...     away = (
+    ...         np.abs(tables.response - sums[0]),
+    ...         np.abs(tables.ramp_response - sums[1]),
+    ...     )
     ...     print(bool(away[0].max() < 1e-12), bool(away[1].max() < 1e-6))
     [True, True, True]
     True True
@@ -576,16 +656,24 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
     >>> entry, offset, _ = offsets((4, 3))
     >>> grid = SimpleNamespace(entry=entry, offset=offset, multiplicity=2, split=1)
     >>> grid.poles, grid.weights = np.zeros(2), np.array([3.0 + 1j, 2.0 - 1j])
-    >>> grid.mode_two, memory = np.linspace(0.1, 0.7, 9), random.normal(size=(2, 2, 2, 2, ENTRIES))
+    >>> grid.mode_two, memory = (
+    ...     np.linspace(0.1, 0.7, 9),
+    ...     random.normal(size=(2, 2, 2, 2, ENTRIES)),
+    ... )
     >>> table = random.normal(size=(2, 4, ENTRIES))
     >>> tables = SimpleNamespace(table=table.ravel(), sums=np.zeros((2, TWO_ROWS)))
     >>> tables.packed, tables.second_packed = np.zeros((2, 2 * TWO_ROWS))
     >>> tables.memory_sum = np.zeros(12, complex)
     >>> fading_memory.py_func(grid, memory.ravel(), tables)
-    >>> E, psi = table[:, 0] + 1j * table[:, 1], memory[..., 0, :] + 1j * memory[..., 1, :]
+    >>> E, psi = (
+    ...     table[:, 0] + 1j * table[:, 1],
+    ...     memory[..., 0, :] + 1j * memory[..., 1, :],
+    ... )
     >>> for q, copy in ((4, 0), (10, 1)):  # both with entry 4
     ...     share = np.array([grid.mode_two[4], 1.0 - grid.mode_two[4]])
-    ...     real, imaginary = ((share * grid.weights * E[:, 4]) @ psi[copy, :, :, 4]).real
+    ...     real, imaginary = (
+    ...         (share * grid.weights * E[:, 4]) @ psi[copy, :, :, 4]
+    ...     ).real
     ...     print(np.allclose(tables.memory_sum[q], real + 1j * imaginary))
     True
     True
@@ -631,15 +719,23 @@ def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None
     >>> plain = FunctionType(advance_with_ramp.py_func.__code__, names)
     >>> random = np.random.default_rng(3)
     >>> entry, offset, _ = offsets((4, 3))
-    >>> grid = SimpleNamespace(entry=entry, offset=offset, multiplicity=2, poles=np.zeros(2))
+    >>> grid = SimpleNamespace(
+    ...     entry=entry, offset=offset, multiplicity=2, poles=np.zeros(2)
+    ... )
     >>> sizes = (2, 2, 2, 2), (2, 4), (2, 2)
-    >>> memory, table, ramp = (random.normal(size=(*size, ENTRIES)) for size in sizes)
+    >>> memory, table, ramp = (
+    ...     random.normal(size=(*size, ENTRIES)) for size in sizes
+    ... )
     >>> V, a = random.normal(size=(2, 12, 2)) @ [1.0, 1j]
     >>> tables = SimpleNamespace(table=table.ravel(), ramp=ramp.ravel())
     >>> tables.slip_rate_hat, tables.slope_hat = V, a
     >>> tables.packed, tables.second_packed = np.zeros((2, 2 * TWO_ROWS))
-    >>> psi = memory[1, ..., 0, 4] + 1j * memory[1, ..., 1, 4]  # (pair, signal) of mode 10
-    >>> E, B, R = (x[:, 0, 4] + 1j * x[:, 1, 4] for x in (table[:, :2], table[:, 2:], ramp))
+    >>> psi = (
+    ...     memory[1, ..., 0, 4] + 1j * memory[1, ..., 1, 4]
+    ... )  # (pair, signal) of mode 10
+    >>> E, B, R = (
+    ...     x[:, 0, 4] + 1j * x[:, 1, 4] for x in (table[:, :2], table[:, 2:], ramp)
+    ... )
     >>> V, a = np.array([V[10].real, V[10].imag]), np.array([a[10].real, a[10].imag])
     >>> plain(grid, memory.reshape(-1), tables)
     >>> expected = E[:, None] * psi + B[:, None] * V + R[:, None] * a
@@ -680,11 +776,19 @@ def grown_memory(grid: Grid, memory: Floats, V_hat: Spectrum, growth: float) -> 
     >>> from types import SimpleNamespace
     >>> entry, offset, _ = offsets((4, 3))
     >>> grid = SimpleNamespace(entry=entry, offset=offset, multiplicity=2, split=1)
-    >>> grid.poles, grid.weights = np.array([-0.5 + 1j, -2.0 - 1j]), np.array([3.0 + 1j, 2.0 - 1j])
-    >>> grid.frequency, grid.mode_two = np.linspace(0.0, 4.0, 9), np.linspace(0.1, 0.7, 9)
+    >>> grid.poles, grid.weights = (
+    ...     np.array([-0.5 + 1j, -2.0 - 1j]),
+    ...     np.array([3.0 + 1j, 2.0 - 1j]),
+    ... )
+    >>> grid.frequency, grid.mode_two = (
+    ...     np.linspace(0.0, 4.0, 9),
+    ...     np.linspace(0.1, 0.7, 9),
+    ... )
     >>> memory, V = np.zeros((2, 2, 2, 2, ENTRIES)), np.arange(12) * (1.0 + 2j)
     >>> total = grown_memory(grid, memory.reshape(-1), V, 0.7)
-    >>> psi = memory[1, ..., 0, 4] + 1j * memory[1, ..., 1, 4]  # (pair, signal) of mode 10
+    >>> psi = (
+    ...     memory[1, ..., 0, 4] + 1j * memory[1, ..., 1, 4]
+    ... )  # (pair, signal) of mode 10
     >>> z, signals = grid.poles[:, None] * 2.0, np.array([10.0, 20.0])
     >>> np.allclose(0.7 * psi, z * psi + signals)
     True

@@ -106,10 +106,13 @@ def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
     The step is `courant` times the stability limit.
 
     >>> import dataclasses, stiction as st
-    >>> blocks = st.Blocks(height=0.03, drive=st.Pusher(height=0.01, width=0.01, side="right"))
+    >>> blocks = st.Blocks(
+    ...     height=0.03, drive=st.Pusher(height=0.01, width=0.01, side="right")
+    ... )
     >>> problem = st.Problem(
     ...     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0),
-    ...     interface=st.Interface(0.1, 16), friction=st.LinearWeakening(weakening_rate=4e10),
+    ...     interface=st.Interface(0.1, 16),
+    ...     friction=st.LinearWeakening(weakening_rate=4e10),
     ...     specimen=blocks,
     ... )
     >>> mesh = make_mesh(problem)
@@ -119,16 +122,23 @@ def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
     [0.0, 1.0]
     >>> mesh.impedance, round(mesh.attenuation * 25.0 * 0.1 / np.pi, 6), mesh.platen
     (500000.0, 1000.0, False)
-    >>> bool(mesh.window == np.ceil(2.0 * 0.1 / 1000.0 / mesh.step)), mesh.correction.dtype.name
+    >>> (
+    ...     bool(mesh.window == np.ceil(2.0 * 0.1 / 1000.0 / mesh.step)),
+    ...     mesh.correction.dtype.name,
+    ... )
     (True, 'float32')
     >>> thin, c_d = np.diff(mesh.heights).min(), 1000.0 * 3.0**0.5
     >>> both = condensed(mesh, 16)[0] + mesh.correction
-    >>> np.allclose(both, problem.blocks.stiffness, rtol=1e-5, atol=1e-6 * both.max())
+    >>> np.allclose(
+    ...     both, problem.blocks.stiffness, rtol=1e-5, atol=1e-6 * both.max()
+    ... )
     True
     >>> half = make_mesh(problem, 0.45).step / mesh.step
     >>> round(half, 6), bool(0.0 < mesh.step < 0.9 * thin / c_d)
     (0.5, True)
-    >>> blocks = st.Blocks(height=0.03, thickness=0.005, drive=st.Platen(stiffness=1e6, mass=0.2))
+    >>> blocks = st.Blocks(
+    ...     height=0.03, thickness=0.005, drive=st.Platen(stiffness=1e6, mass=0.2)
+    ... )
     >>> driven = make_mesh(dataclasses.replace(problem, specimen=blocks))
     >>> driven.platen, driven.stiffness, driven.drive_mass, bool(driven.push.any())
     (True, 400000000.0, 40.0, False)
@@ -198,7 +208,9 @@ def row_heights(height: float, spacing: float) -> Array:
     >>> row_heights(3.0, 1.0).round(6).tolist(), row_heights(2.0, 1.0).tolist()
     ([0.0, 1.0, 1.961538, 3.0], [0.0, 1.0, 2.0])
     >>> steps = np.diff(row_heights(400.0, 1.0))  # at most five times the first
-    >>> print(f"{steps[3] / steps[2]:.6f} {steps[-1] / steps[-2]:.6f} {steps.sum():.6f}")
+    >>> print(
+    ...     f"{steps[3] / steps[2]:.6f} {steps[-1] / steps[-2]:.6f} {steps.sum():.6f}"
+    ... )
     1.080000 1.000000 400.000000
     """
     numbers = np.arange(int(2.0 * height / spacing) + 2)
@@ -218,9 +230,16 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
     u_x, v_y, u_y, a rotation, both stretches, and an hourglass mode.
 
     >>> from types import SimpleNamespace
-    >>> solid = SimpleNamespace(shear_modulus=2.0, wave_speed_ratio=3.0**0.5)  # c_11 = 6, c_12 = 2
+    >>> solid = SimpleNamespace(
+    ...     shear_modulus=2.0, wave_speed_ratio=3.0**0.5
+    ... )  # c_11 = 6, c_12 = 2
     >>> a, b, d = 0.25, 0.5, np.zeros((6, 2, 2, 2))  # (case, row, axis, column)
-    >>> d[[0, 4], :, 0, 1], d[[1, 4], 1, 1], d[[2, 3], 1, 0], d[3, :, 1, 1] = a, b, b, -a
+    >>> d[[0, 4], :, 0, 1], d[[1, 4], 1, 1], d[[2, 3], 1, 0], d[3, :, 1, 1] = (
+    ...     a,
+    ...     b,
+    ...     b,
+    ...     -a,
+    ... )
     >>> d[5, :, 0] = [[1.0, -1.0], [-1.0, 1.0]]
     >>> elements, strips = _elements(np.array([b]), a, solid, False)
     >>> energy = 0.5 * np.einsum("nrac,racsbd,nsbd->n", d, elements[0], d) / (a * b)
@@ -291,14 +310,21 @@ def _stencils(elements: Array, strips: Array) -> Array:
     >>> K = np.zeros((24, 24))  # u and v at the nodes of three rows
     >>> K[:16, :16], K[8:, 8:] = lower, K[8:, 8:] + upper
     >>> K[8:16, 8:16] = lower[8:, 8:] + upper[:8, :8]
-    >>> rows = -K.reshape(3, 2, 4, 3, 2, 4)  # row, axis and node of the force, and of the motion
+    >>> rows = -K.reshape(
+    ...     3, 2, 4, 3, 2, 4
+    ... )  # row, axis and node of the force, and of the motion
     >>> for axis in (0, 1):
     ...     found = stencils[1, axis]
     ...     same, other = rows[1, axis][:, :, axis], rows[1, axis][:, :, 1 - axis]
-    ...     print(np.allclose(found[[0, 1, 0]].T, same[1, :, :3], atol=1e-5), end=" ")
+    ...     print(
+    ...         np.allclose(found[[0, 1, 0]].T, same[1, :, :3], atol=1e-5), end=" "
+    ...     )
     ...     cross = [-found[2], 0.0 * found[2], found[2]]
     ...     print(np.allclose(cross, other[1, :, :3].T, atol=1e-5), end=" ")
-    ...     print(np.allclose([found[3], found[0]], same[0, :, :2].T, atol=1e-5), end=" ")
+    ...     print(
+    ...         np.allclose([found[3], found[0]], same[0, :, :2].T, atol=1e-5),
+    ...         end=" ",
+    ...     )
     ...     print(np.allclose([-found[2], -found[4]], other[3, :, 2:].T, atol=1e-5))
     True True True True
     True True True True
@@ -326,7 +352,10 @@ def _covered(heights: Array, middle: float, width: float) -> Array:
     covers the first three, and its force on the interface goes to row 1.
 
     >>> heights = np.array([0.0, 1.0, 2.0, 4.0])
-    >>> _covered(heights, 1.0, 2.0).tolist(), _covered(heights, 3.5, 2.0).round(6).tolist()
+    >>> (
+    ...     _covered(heights, 1.0, 2.0).tolist(),
+    ...     _covered(heights, 3.5, 2.0).round(6).tolist(),
+    ... )
     ([0.0, 0.75, 0.25, 0.0], [0.0, 0.0, 0.333333, 0.666667])
     """
     edges = np.concatenate([heights[:1], 0.5 * (heights[1:] + heights[:-1]), heights[-1:]])
@@ -354,10 +383,14 @@ def _limit(c: float, c_s: float, mesh: Mesh, correction: Array, viscous: float) 
     >>> print(f"{step * frequency:.6f}")
     2.000000
     >>> damped = _limit(3.0, 2.0, mesh, np.diag([1.0, 3.0, -5.0]), 0.02)
-    >>> print(f"{damped / step + 0.01 * frequency - (1.0 + (0.01 * frequency) ** 2) ** 0.5:.6f}")
+    >>> print(
+    ...     f"{damped / step + 0.01 * frequency - (1.0 + (0.01 * frequency) ** 2) ** 0.5:.6f}"
+    ... )
     0.000000
     >>> close = _limit(2.0, 1.9, mesh, np.diag([-1.0, -2.0, -3.0]), 0.0)
-    >>> print(f"{(2.0 / close) ** 2 * 0.0625:.6f} {8.0 / 3.0 * (2.0**2 + 1.9**2):.6f}")
+    >>> print(
+    ...     f"{(2.0 / close) ** 2 * 0.0625:.6f} {8.0 / 3.0 * (2.0**2 + 1.9**2):.6f}"
+    ... )
     20.293333 20.293333
     """
     thin = min(mesh.spacing, float(np.diff(mesh.heights).min()))
@@ -382,12 +415,18 @@ def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
     >>> from types import SimpleNamespace
     >>> solid = SimpleNamespace(shear_modulus=2.0, wave_speed_ratio=3.0**0.5)
     >>> elements, strips = _elements(np.array([0.7, 0.5]), 0.25, solid, False)
-    >>> K = layer_matrix(SimpleNamespace(elements=elements, strips=strips), 1, 4).toarray()
-    >>> along, up = np.zeros((2, 4, 4))  # (u and v of the lower row, and of the upper row; column)
+    >>> K = layer_matrix(
+    ...     SimpleNamespace(elements=elements, strips=strips), 1, 4
+    ... ).toarray()
+    >>> along, up = np.zeros(
+    ...     (2, 4, 4)
+    ... )  # (u and v of the lower row, and of the upper row; column)
     >>> along[[0, 2]], up[3] = 0.25 * np.arange(4), 0.5
     >>> print(f"{0.5 * along.ravel() @ K @ along.ravel() / (0.25 * 0.5):.6f}")
     9.000000
-    >>> print(f"{0.5 * up.ravel() @ K @ up.ravel() / (0.25 * 0.5):.6f}")  # 3 * 3 + (6 - 4/6)/2
+    >>> print(
+    ...     f"{0.5 * up.ravel() @ K @ up.ravel() / (0.25 * 0.5):.6f}"
+    ... )  # 3 * 3 + (6 - 4/6)/2
     11.666667
     """
     left, right = np.eye(nodes, nodes - 1), np.eye(nodes, nodes - 1, -1)
@@ -420,13 +459,20 @@ def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
     >>> solid = SimpleNamespace(shear_modulus=2.0, wave_speed_ratio=3.0**0.5)
     >>> elements, strips = _elements(np.array([0.25, 0.5]), 0.25, solid, True)
     >>> mesh = SimpleNamespace(
-    ...     spacing=0.25, heights=np.array([0.0, 0.25, 0.75]), elements=elements, strips=strips,
-    ...     anti_plane=True, platen=True, push=np.zeros((3, 2)),
+    ...     spacing=0.25,
+    ...     heights=np.array([0.0, 0.25, 0.75]),
+    ...     elements=elements,
+    ...     strips=strips,
+    ...     anti_plane=True,
+    ...     platen=True,
+    ...     push=np.zeros((3, 2)),
     ... )
     >>> static, profile, C = condensed(mesh, 4)
     >>> profile.round(6).tolist(), round(C * 0.75 / (2.0 * 1.0), 6)
     ([1.0, 1.0, 1.0, 1.0], 1.0)
-    >>> print(f"{np.abs(static.sum(axis=0)).max():.9f} {np.abs(static - static.T).max():.9f}")
+    >>> print(
+    ...     f"{np.abs(static.sum(axis=0)).max():.9f} {np.abs(static - static.T).max():.9f}"
+    ... )
     0.000000000 0.000000000
     >>> bool(static.diagonal().min() > 0.0 > static[0, 1])
     True
@@ -435,15 +481,27 @@ def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
     interface gives the same.
 
     >>> elements, strips = _elements(np.array([0.5]), 0.25, solid, False)
-    >>> fields = {"elements": elements, "strips": strips, "heights": mesh.heights[[0, 2]] / 1.5}
-    >>> fields |= {"anti_plane": False, "platen": True, "push": mesh.push, "spacing": 0.25}
+    >>> fields = {
+    ...     "elements": elements,
+    ...     "strips": strips,
+    ...     "heights": mesh.heights[[0, 2]] / 1.5,
+    ... }
+    >>> fields |= {
+    ...     "anti_plane": False,
+    ...     "platen": True,
+    ...     "push": mesh.push,
+    ...     "spacing": 0.25,
+    ... }
     >>> static, profile, C = condensed(SimpleNamespace(**fields), 4)
     >>> K = layer_matrix(SimpleNamespace(**fields), 0, 4).toarray()
     >>> moves = np.eye(16)[:, 4:9]
     >>> moves[8:12, 4] = 1.0
     >>> flexibility = np.linalg.inv(moves.T @ K @ moves)
     >>> schur = K[:4, :4] - K[:4] @ moves @ flexibility @ moves.T @ K[:, :4]
-    >>> np.allclose(static, 0.5 / 0.25 * schur), np.allclose(C * flexibility[4, 4], 1.0)
+    >>> (
+    ...     np.allclose(static, 0.5 / 0.25 * schur),
+    ...     np.allclose(C * flexibility[4, 4], 1.0),
+    ... )
     (True, True)
     >>> force = -K[:4] @ moves @ flexibility[:, 4]
     >>> np.allclose(profile, 4.0 * force / force.sum())

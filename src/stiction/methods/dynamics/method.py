@@ -53,8 +53,8 @@ def _load_history(load: Any) -> PiecewiseLinear | None:
     """Return the load history for samples (times, values) in s and Pa, or raise an `InputError`.
 
     >>> history = _load_history(([0, 1, 3], [0, 2e6, 1e6]))
-    >>> history.at.tolist(), history.values.tolist(), _load_history(None)
-    ([0.0, 1.0, 3.0], [0.0, 2000000.0, 1000000.0], None)
+    >>> history.at.tolist(), history.values.tolist(), _load_history(None) is None
+    ([0.0, 1.0, 3.0], [0.0, 2000000.0, 1000000.0], True)
     >>> _load_history(([0, 1, 1], [0, 2e6, 1e6]))
     Traceback (most recent call last):
         ...
@@ -212,12 +212,19 @@ class Rupture(Listed):
         Specimens are in equilibrium up to each event.
 
         >>> from types import SimpleNamespace
-        >>> cases = [(True, None, False), (False, None, False), (False, 1, False), (False, 1, True)]
+        >>> cases = [
+        ...     (True, None, False),
+        ...     (False, None, False),
+        ...     (False, 1, False),
+        ...     (False, 1, True),
+        ... ]
         >>> for held, specimen, machine in cases:
         ...     problem = SimpleNamespace(specimen=specimen, has_machine=machine)
         ...     problem.interface = SimpleNamespace(is_held=held)
         ...     events = "first_instability", "critical_stress"
-        ...     print(*(Rupture().bounded_by_strength(problem, event) for event in events))
+        ...     print(
+        ...         *(Rupture().bounded_by_strength(problem, event) for event in events)
+        ...     )
         (False, False) (False, False)
         (True, False) (True, False)
         (True, True) (True, True)
@@ -290,18 +297,29 @@ class Rupture(Listed):
 
         >>> from types import FunctionType, SimpleNamespace
         >>> def summarised(first, state=None, ending="sliding", **options):
-        ...     names = globals() | {"checks": SimpleNamespace(at_first_slip=lambda run: first)}
-        ...     names["checks"].check_finite = names["checks"].warn_of_slip = lambda *given: None
+        ...     names = globals() | {
+        ...         "checks": SimpleNamespace(at_first_slip=lambda run: first)
+        ...     }
+        ...     names["checks"].check_finite = names["checks"].warn_of_slip = (
+        ...         lambda *given: None
+        ...     )
         ...     values = {"kinetic_stress": 3.0}
         ...     names["summary"] = lambda run, state: {"critical_stress": state} | values
         ...     names["event_table"] = lambda *given: {"event_load": given[-1]}
         ...     for name in ("arrested_events", "event_variables"):
         ...         names[name] = lambda *given, **named: []
         ...     load = SimpleNamespace(at=np.array([0.0, 4.0]))
-        ...     setting = SimpleNamespace(load=load, thresholds=SimpleNamespace(end_time=2.5))
+        ...     setting = SimpleNamespace(
+        ...         load=load, thresholds=SimpleNamespace(end_time=2.5)
+        ...     )
         ...     problem = SimpleNamespace(interface=None)
-        ...     run = SimpleNamespace(setting=setting, medium=SimpleNamespace(problem=problem))
-        ...     run.start, run.cut_event = lambda time: f"start at {time}", lambda state: None
+        ...     run = SimpleNamespace(
+        ...         setting=setting, medium=SimpleNamespace(problem=problem)
+        ...     )
+        ...     run.start, run.cut_event = (
+        ...         lambda time: f"start at {time}",
+        ...         lambda state: None,
+        ...     )
         ...     run.run_to_end = lambda state, most: (ending, 0)
         ...     plain = FunctionType(Rupture._summary_of.__code__, names)
         ...     return plain(Rupture(**options), run, state, None, 0)
@@ -348,24 +366,39 @@ def make_run(
     strength falls by 1 Pa at 2 Pa/m.
 
     >>> from types import FunctionType, SimpleNamespace
-    >>> parts = {"_thresholds": lambda *others: "thresholds", "_least_load": lambda *others: 0.25}
-    >>> plain = FunctionType(make_run.__code__, globals() | parts, None, make_run.__defaults__)
+    >>> parts = {
+    ...     "_thresholds": lambda *others: "thresholds",
+    ...     "_least_load": lambda *others: 0.25,
+    ... }
+    >>> plain = FunctionType(
+    ...     make_run.__code__, globals() | parts, None, make_run.__defaults__
+    ... )
     >>> friction = SimpleNamespace(parameters="law", reach=2.0)
     >>> friction.critical_slip_of = lambda drop, rate: drop / rate
-    >>> medium = SimpleNamespace(grid="grid", problem=SimpleNamespace(friction=friction))
+    >>> medium = SimpleNamespace(
+    ...     grid="grid", problem=SimpleNamespace(friction=friction)
+    ... )
     >>> rows = SimpleNamespace(
     ...     strength=np.array([[9.0, 9.0], [3.0, np.inf]]),
     ...     residual_strength=np.array([[5.0, 5.0], [2.0, 2.0]]),
-    ...     weakening_rate=np.array([[1.0, 1.0], [2.0, 2.0]]), load_profile=np.array([1.5, 0.5]),
+    ...     weakening_rate=np.array([[1.0, 1.0], [2.0, 2.0]]),
+    ...     load_profile=np.array([1.5, 0.5]),
     ...     initial_stress=np.array([[0.0, 0.0], [0.25, 0.75]]),
-    ...     part=lambda some: SimpleNamespace(steepest_weakening_rate=(some.start, some.stop)),
+    ...     part=lambda some: SimpleNamespace(
+    ...         steepest_weakening_rate=(some.start, some.stop)
+    ...     ),
     ... )
     >>> history = ([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 3.0, 5.0, 4.0, 6.0])
     >>> run = plain(Rupture(load_history=history, stop="rest"), medium, rows, 1)
     >>> setting = run.setting
     >>> setting.turning_times.tolist(), setting.nodes.residual_slip.tolist()
     ([2.0, 3.0], [1.0, inf])
-    >>> setting.mean_profile, setting.mean_initial, run.steepest_weakening_rate, run.stop
+    >>> (
+    ...     setting.mean_profile,
+    ...     setting.mean_initial,
+    ...     run.steepest_weakening_rate,
+    ...     run.stop,
+    ... )
     (1.5, 0.25, (1, 2), 'rest')
     >>> load = plain(Rupture(loading_rate=7.0), medium, rows, 0).setting.load
     >>> load.at.tolist(), load.values.tolist()
@@ -415,12 +448,21 @@ def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
     at least. One node never weakens, and one cannot break.
 
     >>> from types import SimpleNamespace
-    >>> medium = SimpleNamespace(interface=SimpleNamespace(cell=0.1), problem=SimpleNamespace())
-    >>> medium.problem.half_spaces = SimpleNamespace(nucleation_lengths=lambda rate: (1.2 / rate,))
-    >>> nodes = SimpleNamespace(peak=np.array([11.0, 4.5, 8.0, 4.0, 1.0, np.inf]), initial=1.0)
+    >>> medium = SimpleNamespace(
+    ...     interface=SimpleNamespace(cell=0.1), problem=SimpleNamespace()
+    ... )
+    >>> medium.problem.half_spaces = SimpleNamespace(
+    ...     nucleation_lengths=lambda rate: (1.2 / rate,)
+    ... )
+    >>> nodes = SimpleNamespace(
+    ...     peak=np.array([11.0, 4.5, 8.0, 4.0, 1.0, np.inf]), initial=1.0
+    ... )
     >>> nodes.profile = np.array([2.0, 0.5, 1.0, 1.0, 1.0, 1.0])
     >>> nodes.residual_slip = np.array([1.0, 1.0, 1.0, 1.0, 0.0, np.inf])
-    >>> _least_load(medium, nodes, 2.0), _least_load(medium, nodes, 200.0)  # 3, 5, 7 Pa; 3 Pa
+    >>> (
+    ...     _least_load(medium, nodes, 2.0),
+    ...     _least_load(medium, nodes, 200.0),
+    ... )  # 3, 5, 7 Pa; 3 Pa
     (5.0, 3.0)
     >>> _least_load(medium, nodes, 0.2)  # all four
     5.5
@@ -450,23 +492,44 @@ def _thresholds(
 
     >>> from types import SimpleNamespace
     >>> import stiction as st
-    >>> def thresholds(load=(0.0, 9.0), residual=1.0, peak=(5.0, 6.0, np.inf, 8.0), **options):
+    >>> def thresholds(
+    ...     load=(0.0, 9.0), residual=1.0, peak=(5.0, 6.0, np.inf, 8.0), **options
+    ... ):
     ...     solid = SimpleNamespace(shear_wave_speed=2.0)
     ...     problem = SimpleNamespace(effective_modulus=8.0, solid=solid)
     ...     problem.friction = st.LinearWeakening(weakening_rate=1.0)
     ...     interface = SimpleNamespace(lengths=(0.8, 0.2), reach=0.4, size=8)
-    ...     medium = SimpleNamespace(problem=problem, interface=interface, step=1e-4, impedance=3.0)
-    ...     medium.grid = SimpleNamespace(frequency=np.array([0.0, 40.0 * np.pi, 20.0 * np.pi]))
-    ...     nodes = SimpleNamespace(peak=np.array(peak), residual=np.full(4, residual))
+    ...     medium = SimpleNamespace(
+    ...         problem=problem, interface=interface, step=1e-4, impedance=3.0
+    ...     )
+    ...     medium.grid = SimpleNamespace(
+    ...         frequency=np.array([0.0, 40.0 * np.pi, 20.0 * np.pi])
+    ...     )
+    ...     nodes = SimpleNamespace(
+    ...         peak=np.array(peak), residual=np.full(4, residual)
+    ...     )
     ...     nodes.profile, nodes.initial = np.full(4, 0.5), np.full(4, 0.25)
     ...     history = PiecewiseLinear(np.array([0.0, 1.0]), np.array(load))
     ...     return _thresholds(Rupture(**options), medium, nodes, history)
     >>> found = thresholds(arrival=0.25)
-    >>> found.calm_count, found.breakable, found.period_nodes, found.held, found.slid_stop
+    >>> (
+    ...     found.calm_count,
+    ...     found.breakable,
+    ...     found.period_nodes,
+    ...     found.held,
+    ...     found.slid_stop,
+    ... )
     (500, 3, 6, True, True)
-    >>> [round(value, 9) for value in (found.calm_slip, found.settling_time, found.front_share)]
+    >>> [
+    ...     round(value, 9)
+    ...     for value in (found.calm_slip, found.settling_time, found.front_share)
+    ... ]
     [0.05, 0.2, 0.25]
-    >>> round(found.unstable_slip_rate, 9), round(found.smallest_step, 9), found.end_time
+    >>> (
+    ...     round(found.unstable_slip_rate, 9),
+    ...     round(found.smallest_step, 9),
+    ...     found.end_time,
+    ... )
     (0.125, 0.0006, inf)
     >>> found.explicit_only, found.curved, found.event_stop, found.rest_stop
     (False, False, False, False)
@@ -479,9 +542,14 @@ def _thresholds(
     >>> cases = [{}, falls, {"residual": 5.0}, falls | {"stop": "sliding"}]
     >>> [thresholds(**whole | case).slid_stop for case in cases]
     [True, False, False, True]
-    >>> thresholds(stop="time", end_time=2.0).slid_stop, thresholds(**whole).period_nodes
+    >>> (
+    ...     thresholds(stop="time", end_time=2.0).slid_stop,
+    ...     thresholds(**whole).period_nodes,
+    ... )
     (False, 8)
-    >>> thresholds(stop="rest", **falls).slid_stop  # held, so slip comes to rest anyway
+    >>> thresholds(
+    ...     stop="rest", **falls
+    ... ).slid_stop  # held, so slip comes to rest anyway
     True
     """
     friction, finite = medium.problem.friction, np.isfinite(nodes.peak)

@@ -184,13 +184,21 @@ class Save(Listed):
 
         >>> from stiction.base.errors import collect_warnings
         >>> line, plane = Interface(0.8, 8), Interface((0.8, 0.4), (8, 8))
-        >>> Save(["slip"], stations={"a": 0.34, "b": 0.79, "c": 0.0}).nodes(line).tolist()
+        >>> Save(["slip"], stations={"a": 0.34, "b": 0.79, "c": 0.0}).nodes(
+        ...     line
+        ... ).tolist()
         [3, 0, 0]
-        >>> Save(["slip"], stations={"a": (0.34, 0.12)}).nodes(plane).tolist()  # 3 * 8 + 2
+        >>> Save(["slip"], stations={"a": (0.34, 0.12)}).nodes(
+        ...     plane
+        ... ).tolist()  # 3 * 8 + 2
         [26]
         >>> with collect_warnings() as warned:
-        ...     nodes = Save(["slip"], stations={"a": 0.049, "b": 0.051, "d": 0.0}).nodes(line)
-        ...     _ = Save(["slip"], stations={"c": 0.6}).nodes(Interface(0.8, 8, extent=(0.1, 0.5)))
+        ...     nodes = Save(
+        ...         ["slip"], stations={"a": 0.049, "b": 0.051, "d": 0.0}
+        ...     ).nodes(line)
+        ...     _ = Save(["slip"], stations={"c": 0.6}).nodes(
+        ...         Interface(0.8, 8, extent=(0.1, 0.5))
+        ...     )
         >>> nodes.tolist(), [str(warning)[:32] for warning in warned]
         ([0, 1, 0], ["stations['a']: (0.049,) is neare", "stations['c']: (0.6,) lies beyon"])
         """
@@ -251,7 +259,9 @@ class Recorder:
         """Keep a frame of the present state.
 
         >>> from types import FunctionType, SimpleNamespace
-        >>> names = globals() | {"energy_balance": lambda run, state: {"strain_energy": 9.0}}
+        >>> names = globals() | {
+        ...     "energy_balance": lambda run, state: {"strain_energy": 9.0}
+        ... }
         >>> plain = FunctionType(Recorder.add.__code__, names)
         >>> medium = SimpleNamespace(interface=Interface(0.8, 8))
         >>> solid = SimpleNamespace(shear_modulus=3.0)
@@ -259,11 +269,19 @@ class Recorder:
         >>> run = SimpleNamespace(medium=medium)
         >>> run.setting = SimpleNamespace(thresholds=SimpleNamespace(breakable=4))
         >>> run.mean, run.strength_after = np.mean, lambda slip: 5.0 - slip
-        >>> step = {"time": 1.0, "load": 2.0, "mean_stress": 3.0, "work": 4.0, "weakened_nodes": 3}
+        >>> step = {
+        ...     "time": 1.0,
+        ...     "load": 2.0,
+        ...     "mean_stress": 3.0,
+        ...     "work": 4.0,
+        ...     "weakened_nodes": 3,
+        ... }
         >>> slip, stress = np.full(8, 0.5), np.arange(8.0)
         >>> state = SimpleNamespace(now={"step": step}, slip=slip, stress=stress)
         >>> state.slip_rate = 0.1 * stress
-        >>> recorder = SimpleNamespace(run=run, save=Save(["shear_stress", "strength"]), _frames=[])
+        >>> recorder = SimpleNamespace(
+        ...     run=run, save=Save(["shear_stress", "strength"]), _frames=[]
+        ... )
         >>> plain(recorder, state)
         >>> stress += 9.0  # a frame keeps its values
         >>> for name, value in recorder._frames[0].items():
@@ -311,7 +329,9 @@ class Recorder:
         >>> import stiction as st
         >>> problem = st.paper.problem(nodes=256)
         >>> medium = SimpleNamespace(problem=problem, interface=problem.interface)
-        >>> run = SimpleNamespace(medium=medium, setting=SimpleNamespace(stations=np.array([3, 5])))
+        >>> run = SimpleNamespace(
+        ...     medium=medium, setting=SimpleNamespace(stations=np.array([3, 5]))
+        ... )
         >>> save = Save(["slip"], stations={"a": 0.001, "b": 0.002})
         >>> recorder = Recorder(run, save, {"stopped": "rest"})
         >>> frame = dict.fromkeys(SCALARS, 2.0) | {"slip": np.full(256, 0.5)}
@@ -323,9 +343,15 @@ class Recorder:
         >>> data = recorder.take()
         >>> dict(data.sizes), data.time.values.tolist(), data.step_load.values.tolist()
         ({'time': 2, 'x': 256, 'step': 3, 'station': 2}, [1.0, 4.0], [1.0, 2.0, 2.0])
-        >>> data.station_x.values.round(9).tolist(), data.station_slip.shape, data.attrs["stopped"]
+        >>> (
+        ...     data.station_x.values.round(9).tolist(),
+        ...     data.station_slip.shape,
+        ...     data.attrs["stopped"],
+        ... )
         ([0.001171875, 0.001953125], (3, 2), 'rest')
-        >>> (data.moment_rate / (1e9 * 0.1)).values.round(9).tolist()  # G times the length
+        >>> (data.moment_rate / (1e9 * 0.1)).values.round(
+        ...     9
+        ... ).tolist()  # G times the length
         [1.0, 2.0, 2.0]
         >>> dict(recorder.take().sizes)["time"]
         0
@@ -366,13 +392,23 @@ class Recorder:
 
         >>> import tempfile
         >>> from types import FunctionType, SimpleNamespace
-        >>> names = globals() | {"write_checkpoint": lambda path, *given: path.write_text("")}
+        >>> names = globals() | {
+        ...     "write_checkpoint": lambda path, *given: path.write_text("")
+        ... }
         >>> names["read_checkpoint"] = lambda *given: None
-        >>> plain, folder = FunctionType(Recorder.begin.__code__, names), Path(tempfile.mkdtemp())
-        >>> recorder = SimpleNamespace(save=SimpleNamespace(to=folder), run=None, _saved="")
+        >>> plain, folder = (
+        ...     FunctionType(Recorder.begin.__code__, names),
+        ...     Path(tempfile.mkdtemp()),
+        ... )
+        >>> recorder = SimpleNamespace(
+        ...     save=SimpleNamespace(to=folder), run=None, _saved=""
+        ... )
         >>> state = SimpleNamespace(steps=7)
         >>> _ = (folder / f"killed{PART}").write_text("")
-        >>> plain(recorder, state), {path.suffix for path in folder.iterdir()} == {".npz", PART}
+        >>> (
+        ...     plain(recorder, state),
+        ...     {path.suffix for path in folder.iterdir()} == {".npz", PART},
+        ... )
         (False, True)
         >>> for name in ("frames-000000000007.nc", "frames-000000000008.nc"):
         ...     _ = (folder / name).write_text("")
@@ -472,16 +508,29 @@ def _digest(run: Run, saved: str) -> str:
 
     >>> from types import SimpleNamespace
     >>> def digest(saved="", peak=1.0, law=2.0, load=3.0, end_time=4.0, **others):
-    ...     grid, step, length = (others.get(name, 5.0) for name in ("grid", "step", "length"))
+    ...     grid, step, length = (
+    ...         others.get(name, 5.0) for name in ("grid", "step", "length")
+    ...     )
     ...     friction = SimpleNamespace(fraction=lambda slips: np.exp(-law * slips))
-    ...     medium = SimpleNamespace(grid=("transform", grid), interface=Interface(length, 8))
+    ...     medium = SimpleNamespace(
+    ...         grid=("transform", grid), interface=Interface(length, 8)
+    ...     )
     ...     medium.step = step
-    ...     medium.problem, times = SimpleNamespace(friction=friction), np.array([0.0, 1.0])
-    ...     setting = SimpleNamespace(nodes=[np.array([peak])], load=[times, load * times], law=[])
+    ...     medium.problem, times = (
+    ...         SimpleNamespace(friction=friction),
+    ...         np.array([0.0, 1.0]),
+    ...     )
+    ...     setting = SimpleNamespace(
+    ...         nodes=[np.array([peak])], load=[times, load * times], law=[]
+    ...     )
     ...     setting.thresholds = [True, end_time]
     ...     return _digest(SimpleNamespace(medium=medium, setting=setting), saved)
     >>> names = "peak", "law", "load", "end_time", "grid", "step", "length"
-    >>> digests = [digest(), digest(saved="a"), *(digest(**{name: 7.0}) for name in names)]
+    >>> digests = [
+    ...     digest(),
+    ...     digest(saved="a"),
+    ...     *(digest(**{name: 7.0}) for name in names),
+    ... ]
     >>> digest() == digests[0], len(set(digests)), len(digests[0])
     (True, 9, 64)
     """
@@ -508,16 +557,34 @@ def write_checkpoint(path: Path, run: Run, state: RuptureState, saved: str = "")
     >>> from types import FunctionType, SimpleNamespace
     >>> names = globals() | {"_digest": lambda run, saved: f"digest of {saved}"}
     >>> functions = write_checkpoint, read_checkpoint
-    >>> write, read = (FunctionType(of.__code__, names, None, of.__defaults__) for of in functions)
-    >>> state = RuptureState(*np.arange(20.0).reshape(10, 2), np.zeros(1, DIAGNOSTICS))
-    >>> run, path = SimpleNamespace(events=[]), Path(tempfile.mkdtemp()) / "checkpoint.npz"
+    >>> write, read = (
+    ...     FunctionType(of.__code__, names, None, of.__defaults__)
+    ...     for of in functions
+    ... )
+    >>> state = RuptureState(
+    ...     *np.arange(20.0).reshape(10, 2), np.zeros(1, DIAGNOSTICS)
+    ... )
+    >>> run, path = (
+    ...     SimpleNamespace(events=[]),
+    ...     Path(tempfile.mkdtemp()) / "checkpoint.npz",
+    ... )
     >>> run.events.append(np.zeros((), event_type(2)))
     >>> state.now["step"]["time"], run.events[0]["time"] = 3.0, 5.0
     >>> write(path, run, state, "this")
-    >>> empty, other = RuptureState(*np.zeros((10, 2)), np.zeros(1, DIAGNOSTICS)), SimpleNamespace()
-    >>> read(path, other, empty, "this") is empty, empty.memory.tolist(), empty.event_slip.tolist()
+    >>> empty, other = (
+    ...     RuptureState(*np.zeros((10, 2)), np.zeros(1, DIAGNOSTICS)),
+    ...     SimpleNamespace(),
+    ... )
+    >>> (
+    ...     read(path, other, empty, "this") is empty,
+    ...     empty.memory.tolist(),
+    ...     empty.event_slip.tolist(),
+    ... )
     (True, [10.0, 11.0], [18.0, 19.0])
-    >>> float(empty.now["step"]["time"]), [float(event["time"]) for event in other.events]
+    >>> (
+    ...     float(empty.now["step"]["time"]),
+    ...     [float(event["time"]) for event in other.events],
+    ... )
     (3.0, [5.0])
     >>> read(path, other, empty, "that")  # doctest: +ELLIPSIS
     Traceback (most recent call last):

@@ -68,10 +68,16 @@ def write_scec(
     --------
     >>> import stiction as st
     >>> problem = st.paper.problem(nodes=256)
-    >>> tau_p = st.paper.strength(problem, correlation_ratio=1.0).sample(problem.interface)[0]
-    >>> save = st.Save(fields=["slip", "slip_rate", "shear_stress"], stations={"a": 0.03})
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=1.0).sample(
+    ...     problem.interface
+    ... )[0]
+    >>> save = st.Save(
+    ...     fields=["slip", "slip_rate", "shear_stress"], stations={"a": 0.03}
+    ... )
     >>> method = st.Rupture(loading_rate=1e8)
-    >>> run = st.simulate_rupture(problem, tau_p, method=method, save=save, progress=False)
+    >>> run = st.simulate_rupture(
+    ...     problem, tau_p, method=method, save=save, progress=False
+    ... )
     >>> import tempfile
     >>> folder = tempfile.mkdtemp()
     >>> options = {"origin": 0.05, "normal_stress": -5e6, "benchmark": "block 7"}
@@ -84,11 +90,24 @@ def write_scec(
 
     >>> import xarray as xr
     >>> fields = {name: (("time", "x"), np.zeros((2, 3))) for name in STATION_UNITS}
-    >>> values = {"slip": [1.0, 2.0], "slip_rate": [3.0, 4.0], "shear_stress": [5e6, 6e6]}
-    >>> fields |= {f"station_{n}": (("step", "station"), np.c_[v]) for n, v in values.items()}
+    >>> values = {
+    ...     "slip": [1.0, 2.0],
+    ...     "slip_rate": [3.0, 4.0],
+    ...     "shear_stress": [5e6, 6e6],
+    ... }
+    >>> fields |= {
+    ...     f"station_{n}": (("step", "station"), np.c_[v])
+    ...     for n, v in values.items()
+    ... }
     >>> fields |= {"arrival_time": ("x", [np.nan, 2.0, 3.5]), "onset_time": 1.5}
-    >>> places = {"x": [0.0, 100.0, 200.0], "station": ["a"], "station_x": ("station", [100.0])}
-    >>> run = xr.Dataset(fields, places | {"time": [1.0, 1.8], "step_time": ("step", [1.6, 2.0])})
+    >>> places = {
+    ...     "x": [0.0, 100.0, 200.0],
+    ...     "station": ["a"],
+    ...     "station_x": ("station", [100.0]),
+    ... }
+    >>> run = xr.Dataset(
+    ...     fields, places | {"time": [1.0, 1.8], "step_time": ("step", [1.6, 2.0])}
+    ... )
     >>> options = {"origin": 0.0, "normal_stress": -5e6, "benchmark": "own"}
     >>> record, plot = write_scec(run, folder, **options)
     >>> for line in (record.name, *record.read_text().splitlines()[:5]):
@@ -196,7 +215,9 @@ def _file_names(places: list[list[float]], stations: list[str]) -> list[str]:
     ['faultst075dp045.txt', 'faultst-20dp000.txt']
     >>> _file_names([[7500.0, 4500.0], [7520.0, 4500.0]], ["a", "b"])
     ['faultst075.0dp045.0.txt', 'faultst075.2dp045.0.txt']
-    >>> _file_names([[7.0, 4.0], [1.0, 4.0], [7.0, 4.0]], ["a", "b", "c"])  # doctest: +ELLIPSIS
+    >>> _file_names(
+    ...     [[7.0, 4.0], [1.0, 4.0], [7.0, 4.0]], ["a", "b", "c"]
+    ... )  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
     stiction.base.errors.InputError: run: some of the stations a, c share a node, ...

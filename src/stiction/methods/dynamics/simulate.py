@@ -106,9 +106,13 @@ def simulate_rupture(
     --------
     >>> import stiction as st
     >>> problem = st.paper.problem(nodes=256)
-    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(
+    ...     problem.interface, seed=1
+    ... )
     >>> method = st.Rupture(loading_rate=1e8, stop="onset")
-    >>> run = st.simulate_rupture(problem, tau_p[0], method=method, save=st.Save(["slip"]))
+    >>> run = st.simulate_rupture(
+    ...     problem, tau_p[0], method=method, save=st.Save(["slip"])
+    ... )
     >>> run.attrs["stopped"]
     'onset'
     """
@@ -170,16 +174,32 @@ def _record_to_end(
     ...         calls.append(count)
     ...         state.steps, state.explicit = state.steps + count, True
     ...         return count, reason
+    ...
     ...     calls, meter = [], SimpleNamespace(advance=lambda taken: None)
-    ...     step = {"time": 1.0, "mean_stress": 2e6, "weakened_nodes": 3, "load": 5.0}
+    ...     step = {
+    ...         "time": 1.0,
+    ...         "mean_stress": 2e6,
+    ...         "weakened_nodes": 3,
+    ...         "load": 5.0,
+    ...     }
     ...     state = SimpleNamespace(steps=0, explicit=False, now={"step": step})
-    ...     recorder = SimpleNamespace(save=SimpleNamespace(every=20), take_steps=take_steps)
+    ...     recorder = SimpleNamespace(
+    ...         save=SimpleNamespace(every=20), take_steps=take_steps
+    ...     )
     ...     words = {True: "now", False: "flush"}
-    ...     recorder.flush = lambda state, at_once=False: calls.append(words[at_once])
+    ...     recorder.flush = lambda state, at_once=False: calls.append(
+    ...         words[at_once]
+    ...     )
     ...     recorder.add = lambda state: calls.append("add")
-    ...     run = SimpleNamespace(ending=lambda state, reason: ending if state.steps > 20 else None)
+    ...     run = SimpleNamespace(
+    ...         ending=lambda state, reason: ending if state.steps > 20 else None
+    ...     )
     ...     run.setting = SimpleNamespace(thresholds=SimpleNamespace(breakable=4))
-    ...     return _record_to_end(run, state, recorder, max_steps, meter), calls, meter.note
+    ...     return (
+    ...         _record_to_end(run, state, recorder, max_steps, meter),
+    ...         calls,
+    ...         meter.note,
+    ...     )
     >>> recorded(23)[:2]
     ('max_steps', [2, 'add', 'flush', 20, 'add', 'flush', 'now', 1, 'add', 'flush'])
     >>> recorded(99, ending="sliding")
@@ -219,9 +239,13 @@ def _spectrum(dataset: xr.Dataset, run: Run, state: RuptureState) -> tuple[Any, 
     >>> from types import FunctionType, SimpleNamespace
     >>> def given(problem, time, rate):
     ...     return time.tolist(), rate.tolist()
-    >>> plain = FunctionType(_spectrum.__code__, globals() | {"rate_spectrum": given})
+    >>> plain = FunctionType(
+    ...     _spectrum.__code__, globals() | {"rate_spectrum": given}
+    ... )
     >>> data = {"step_time": np.arange(1.0, 7.0), "moment_rate": 10.0 * np.arange(6)}
-    >>> data = {name: SimpleNamespace(values=values) for name, values in data.items()}
+    >>> data = {
+    ...     name: SimpleNamespace(values=values) for name, values in data.items()
+    ... }
     >>> run = SimpleNamespace(medium=SimpleNamespace(problem=None))
     >>> run.events = [{"time": 1.0}, {"time": 2.0}, {"time": 5.0}, {"time": 4.0}]
     >>> results = {"onset_time": 2.0, "instabilities": 4}
@@ -230,7 +254,11 @@ def _spectrum(dataset: xr.Dataset, run: Run, state: RuptureState) -> tuple[Any, 
     >>> run.events = run.events[:2]
     >>> plain(data, run, SimpleNamespace(now={"results": results}))[0]
     [2.0, 3.0, 4.0, 5.0, 6.0]
-    >>> plain(data, run, SimpleNamespace(now={"results": results | {"instabilities": 0}}))[0]
+    >>> plain(
+    ...     data,
+    ...     run,
+    ...     SimpleNamespace(now={"results": results | {"instabilities": 0}}),
+    ... )[0]
     []
     """
     moment_rate = dataset["moment_rate"].values

@@ -75,9 +75,16 @@ def refusals(method: Any, problem: Problem) -> list[str]:
     >>> from types import SimpleNamespace
     >>> import stiction as st
     >>> problem = SimpleNamespace(friction=st.LinearWeakening(4.0), specimen=None)
-    >>> refusals(st.Rupture(courant=0.5, arrival=0.1, max_steps=9, events=2), problem)
+    >>> refusals(
+    ...     st.Rupture(courant=0.5, arrival=0.1, max_steps=9, events=2), problem
+    ... )
     []
-    >>> [reason[:28] for reason in refusals(st.Rupture(loading_rate=1e6, start="rest"), problem)]
+    >>> [
+    ...     reason[:28]
+    ...     for reason in refusals(
+    ...         st.Rupture(loading_rate=1e6, start="rest"), problem
+    ...     )
+    ... ]
     ['loading_rate: has no effect ', 'start: has no effect on a sp']
     >>> problem.friction = st.ExponentialWeakening(4.0)
     >>> [reason[:30] for reason in refusals(st.Rupture(), problem)]
@@ -107,7 +114,9 @@ def variables(method: Any, problem: Problem) -> dict[str, Variable]:
     >>> from types import FunctionType, SimpleNamespace
     >>> from stiction.problem.interface import Interface
     >>> solver = SimpleNamespace(variables=lambda problem: {"critical_load": None})
-    >>> plain = FunctionType(variables.__code__, globals() | {"Equilibrium": lambda: solver})
+    >>> plain = FunctionType(
+    ...     variables.__code__, globals() | {"Equilibrium": lambda: solver}
+    ... )
     >>> problem = SimpleNamespace(interface=Interface(0.8, 8, ends="free"))
     >>> [*plain(SimpleNamespace(events=0), problem)]
     ['critical_load', 'rupture_speed', 'median_rupture_speed']
@@ -161,7 +170,11 @@ class DynamicEvent:
         >>> plain = FunctionType(DynamicEvent.take_steps.__code__, names)
         >>> waves = SimpleNamespace(slip=np.array([0.5, 0.0]))
         >>> event = DynamicEvent(None, None, None, None, waves, None, steps=10)
-        >>> plain(event, 5, True), event.steps, event.slides  # a node has not slipped yet
+        >>> (
+        ...     plain(event, 5, True),
+        ...     event.steps,
+        ...     event.slides,
+        ... )  # a node has not slipped yet
         (True, 13, False)
         >>> waves.slip[1] = 0.1
         >>> plain(event, 5, False), event.steps, event.slides
@@ -231,9 +244,15 @@ def begin(
     >>> from types import SimpleNamespace
     >>> excess, residual = np.array([5.0, 7.0, np.inf]), np.array([1.0, 2.0, 0.0])
     >>> sample = SimpleNamespace(excess=excess, residual=residual)
-    >>> sample.profile, sample.critical = np.array([1.0, 3.0, 5.0]), np.array([2.0, 4.0, np.inf])
+    >>> sample.profile, sample.critical = (
+    ...     np.array([1.0, 3.0, 5.0]),
+    ...     np.array([2.0, 4.0, np.inf]),
+    ... )
     >>> before = SimpleNamespace(load=10.0, slip=np.array([0.999, 2.5, 0.0]))
-    >>> before.direction, mesh = np.array([0.25, 0.5, 0.0]), SimpleNamespace(heights=np.zeros(2))
+    >>> before.direction, mesh = (
+    ...     np.array([0.25, 0.5, 0.0]),
+    ...     SimpleNamespace(heights=np.zeros(2)),
+    ... )
     >>> stiffness = np.array([[2.0, -1.0, 0.0], [-1.0, 3.0, 0.0], [0.0, -2.0, 2.0]])
     >>> mesh.impedance = 2.0
     >>> event = begin(sample, mesh, stiffness, before, 0.5)
@@ -307,15 +326,27 @@ class RuptureSearch(DenseSearch):
         >>> event = SimpleNamespace(waves=waves, slides=True, run=lambda max_steps: None)
         >>> search = SimpleNamespace(event=lambda *given: event, max_steps=9, ends=True)
         >>> search._workspaces = 1, 2
-        >>> search.problem = SimpleNamespace(blocks=SimpleNamespace(stiffness=np.diag([3.0, 4.0])))
+        >>> search.problem = SimpleNamespace(
+        ...     blocks=SimpleNamespace(stiffness=np.diag([3.0, 4.0]))
+        ... )
         >>> unstable = SimpleNamespace(load=7.0, direction=np.array([0.0, 1.0]))
         >>> search.may_stop = True
         >>> result = plain(search, None, unstable, False)
-        >>> result.outcome.name, result.state.Kd.tolist(), result.known, result.state.status.name
+        >>> (
+        ...     result.outcome.name,
+        ...     result.state.Kd.tolist(),
+        ...     result.known,
+        ...     result.state.status.name,
+        ... )
         ('SLIDING', [3.0, 8.0], {'event_duration': 3.0}, 'STABLE')
         >>> event.slides, now["fast"] = False, 0
         >>> result = plain(search, None, unstable, False)
-        >>> result.outcome.name, result.known, result.arrival.tolist(), result.state.stopped
+        >>> (
+        ...     result.outcome.name,
+        ...     result.known,
+        ...     result.arrival.tolist(),
+        ...     result.state.stopped,
+        ... )
         ('ARRESTED', {'event_duration': nan}, [0.5, 0.75], True)
         """
         event = self.event(sample, unstable)
@@ -368,7 +399,9 @@ def refuse_overstress(rows: Sample) -> None:
     """Raise an `InputError` for stress above the strength, which only half-spaces accept.
 
     >>> from types import SimpleNamespace
-    >>> rows = SimpleNamespace(strength=np.array([5.0, 4.0]), initial_stress=np.array([5.0, 3.0]))
+    >>> rows = SimpleNamespace(
+    ...     strength=np.array([5.0, 4.0]), initial_stress=np.array([5.0, 3.0])
+    ... )
     >>> refuse_overstress(rows)
     >>> rows.initial_stress[1] = 4.1
     >>> refuse_overstress(rows)

@@ -46,7 +46,9 @@ class PiecewiseLinear(NamedTuple):
 def value_at(history: PiecewiseLinear, t: float) -> Any:
     """Return the value of a piecewise linear function.
 
-    >>> history = PiecewiseLinear(np.array([0.0, 1.0, 3.0]), np.array([2.0, 5.0, 4.0]))
+    >>> history = PiecewiseLinear(
+    ...     np.array([0.0, 1.0, 3.0]), np.array([2.0, 5.0, 4.0])
+    ... )
     >>> [value_at(history, t) for t in (-1.0, 0.5, 1.0, 2.0, 5.0)]
     [-1.0, 3.5, 5.0, 4.5, 3.0]
     """
@@ -222,7 +224,12 @@ def event_type(nodes: int) -> np.dtype[Any]:
     Pairs are values before and after.
 
     >>> event = np.zeros((), event_type(3))
-    >>> event["slip"].shape, event["load"].shape, event["work"].shape, event["node"].dtype.kind
+    >>> (
+    ...     event["slip"].shape,
+    ...     event["load"].shape,
+    ...     event["work"].shape,
+    ...     event["node"].dtype.kind,
+    ... )
     ((2, 3), (2,), (2,), 'i')
     """
     return np.dtype(
@@ -319,8 +326,14 @@ def node_strength(setting: Setting, i: int, slip: float) -> Any:
 
     >>> from types import SimpleNamespace
     >>> from stiction.problem.friction.parameters import Linear
-    >>> fields = {"peak": [5.0, 7.0], "residual": [1.0, 2.0], "weakening_rate": [2.0, 3.0]}
-    >>> nodes = SimpleNamespace(**{name: np.array(values) for name, values in fields.items()})
+    >>> fields = {
+    ...     "peak": [5.0, 7.0],
+    ...     "residual": [1.0, 2.0],
+    ...     "weakening_rate": [2.0, 3.0],
+    ... }
+    >>> nodes = SimpleNamespace(
+    ...     **{name: np.array(values) for name, values in fields.items()}
+    ... )
     >>> setting = SimpleNamespace(law=Linear(), nodes=nodes)
     >>> [node_strength.py_func(setting, i, 1.5) for i in (0, 1)]
     [2.0, 2.5]
@@ -335,8 +348,14 @@ def node_line(setting: Setting, i: int, slip: float, ahead: float) -> Any:
 
     >>> from types import SimpleNamespace
     >>> from stiction.problem.friction.parameters import Linear
-    >>> fields = {"peak": [5.0, 7.0], "residual": [1.0, 2.0], "weakening_rate": [2.0, 3.0]}
-    >>> nodes = SimpleNamespace(**{name: np.array(values) for name, values in fields.items()})
+    >>> fields = {
+    ...     "peak": [5.0, 7.0],
+    ...     "residual": [1.0, 2.0],
+    ...     "weakening_rate": [2.0, 3.0],
+    ... }
+    >>> nodes = SimpleNamespace(
+    ...     **{name: np.array(values) for name, values in fields.items()}
+    ... )
     >>> setting = SimpleNamespace(law=Linear(), nodes=nodes)
     >>> [node_line.py_func(setting, 1, 1.5, ahead) for ahead in (0.1, 0.5)]
     [(2.5, 3.0), (2.0, 0.0)]
@@ -383,7 +402,10 @@ class RuptureState(NamedTuple):
         """Number of steps so far, explicit and implicit.
 
         >>> state = RuptureState(*[np.zeros(0)] * 10, np.zeros(1, DIAGNOSTICS))
-        >>> state.now["stepping"]["explicit_steps"], state.now["stepping"]["implicit_steps"] = 5, 2
+        >>> (
+        ...     state.now["stepping"]["explicit_steps"],
+        ...     state.now["stepping"]["implicit_steps"],
+        ... ) = 5, 2
         >>> state.steps
         7
         """

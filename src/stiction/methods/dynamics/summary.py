@@ -71,8 +71,15 @@ def scalars(interface: Interface) -> dict[str, Variable]:
     wave speeds. On a line this happens only if a long part breaks
     almost at once.
 
-    >>> line, plane = scalars(Interface(0.8, 8)), scalars(Interface((0.8, 0.8), (8, 8)))
-    >>> sorted({*line} - {*plane}), line["seismic_moment"].units, plane["seismic_moment"].units
+    >>> line, plane = (
+    ...     scalars(Interface(0.8, 8)),
+    ...     scalars(Interface((0.8, 0.8), (8, 8))),
+    ... )
+    >>> (
+    ...     sorted({*line} - {*plane}),
+    ...     line["seismic_moment"].units,
+    ...     plane["seismic_moment"].units,
+    ... )
     (['rupture_speed'], 'N', 'N m')
     >>> line["median_rupture_speed"].dims, plane["median_rupture_speed"].dims
     (('sample',), ('sample', 'direction'))
@@ -108,7 +115,9 @@ def rate_spectrum(
     0.333333 0.666667 100 N
     >>> t = 1.0 + 3.0 * (np.arange(3000) + 0.5) / 3000
     >>> waves = [np.exp(-2j * np.pi * f[i] * t) for i in (0, 60)]
-    >>> integrals = [abs(3.0 * np.mean(np.interp(t, time, rate) * wave)) for wave in waves]
+    >>> integrals = [
+    ...     abs(3.0 * np.mean(np.interp(t, time, rate) * wave)) for wave in waves
+    ... ]
     >>> np.allclose(amplitude[[0, 60]], integrals, rtol=1e-5)
     True
     >>> for count in (3001, 19, 2):  # steps of 1 ms and 1/6 s; too few times
@@ -164,7 +173,9 @@ def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[s
     >>> medium = SimpleNamespace(problem=problem)
     >>> medium.grid = SimpleNamespace(transform=make_transform((6,)), cell=0.25)
     >>> medium.grid.stiffness = np.array([[9.0, 1.0, 2.0, 5.0]])
-    >>> nodes = SimpleNamespace(residual=np.full(6, 2.0), weakening_rate=np.full(6, 4.0))
+    >>> nodes = SimpleNamespace(
+    ...     residual=np.full(6, 2.0), weakening_rate=np.full(6, 4.0)
+    ... )
     >>> nodes.peak = np.append(np.full(5, 8.0), np.inf)
     >>> slip = np.array([0.5, 2.0, 0.0, 0.0, 1.0, 0.0])
     >>> run = SimpleNamespace(medium=medium, setting=SimpleNamespace(nodes=nodes))
@@ -172,7 +183,10 @@ def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[s
     >>> fracture = 0.25 * ((6.0 * 0.5 - 2.0 * 0.25) + 36.0 / 8.0 + (6.0 * 1.0 - 2.0))
     >>> stress = np.fft.irfft(np.fft.rfft(slip) * [0.0, 1.0, 2.0, 5.0], 6)
     >>> strain, residual = 0.5 * 0.25 * slip @ stress, 0.25 * 2.0 * 3.5
-    >>> np.allclose([*energies.values()], [strain, fracture, 50.0 - strain - fracture - residual])
+    >>> np.allclose(
+    ...     [*energies.values()],
+    ...     [strain, fracture, 50.0 - strain - fracture - residual],
+    ... )
     True
     """
     nodes, grid, friction = run.setting.nodes, run.medium.grid, run.medium.problem.friction
@@ -198,11 +212,24 @@ def arrested_events(run: Run) -> list[ArrestedEvent]:
     >>> from stiction.methods.dynamics.state import event_type
     >>> def energies(run, slip, slip_hat, work):
     ...     return {"radiated_energy": work + slip_hat[0].real}
-    >>> plain = FunctionType(arrested_events.__code__, globals() | {"_energies": energies})
+    >>> plain = FunctionType(
+    ...     arrested_events.__code__, globals() | {"_energies": energies}
+    ... )
     >>> record = np.zeros((), event_type(8))
-    >>> record["time"], record["node"], record["settled"], record["duration"] = 3.0, 5, 1, 0.5
-    >>> record["load"], record["work"], record["slip"][1] = (7.0, 8.0), (10.0, 14.0), 0.25
-    >>> run = SimpleNamespace(medium=SimpleNamespace(interface=Interface(0.8, 8)), events=[record])
+    >>> record["time"], record["node"], record["settled"], record["duration"] = (
+    ...     3.0,
+    ...     5,
+    ...     1,
+    ...     0.5,
+    ... )
+    >>> record["load"], record["work"], record["slip"][1] = (
+    ...     (7.0, 8.0),
+    ...     (10.0, 14.0),
+    ...     0.25,
+    ... )
+    >>> run = SimpleNamespace(
+    ...     medium=SimpleNamespace(interface=Interface(0.8, 8)), events=[record]
+    ... )
     >>> ((before, after, known),) = plain(run)
     >>> before.load, after.load, float(after.slip.sum()), float(before.slip.sum())
     (7.0, 8.0, 2.0, 0.0)
@@ -243,10 +270,16 @@ def _speeds(run: Run, state: RuptureState) -> dict[str, list[float]]:
     >>> from types import SimpleNamespace
     >>> plane = Interface((32.0, 32.0), (32, 32))
     >>> x, y = (np.abs(np.arange(32.0) - at) for at in (5, 9))
-    >>> arrival = np.minimum(x, 32.0 - x)[:, None] / 2.0 + np.minimum(y, 32.0 - y) / 3.0
-    >>> arrival[np.ix_(x > 0.0, y > 0.0)] = np.nan  # only the lines through the node count
+    >>> arrival = (
+    ...     np.minimum(x, 32.0 - x)[:, None] / 2.0 + np.minimum(y, 32.0 - y) / 3.0
+    ... )
+    >>> arrival[np.ix_(x > 0.0, y > 0.0)] = (
+    ...     np.nan
+    ... )  # only the lines through the node count
     >>> problem = SimpleNamespace(nucleation_lengths=lambda rate: (8.0, 8.0))
-    >>> run = SimpleNamespace(medium=SimpleNamespace(interface=plane, problem=problem))
+    >>> run = SimpleNamespace(
+    ...     medium=SimpleNamespace(interface=plane, problem=problem)
+    ... )
     >>> run.steepest_weakening_rate = 1.0
     >>> state = SimpleNamespace(arrival=arrival.ravel())
     >>> state.now = {"results": {"onset_node": 5 * 32 + 9}}
@@ -273,9 +306,13 @@ def _critical_load(run: Run, now: Any) -> float:
 
     >>> from types import SimpleNamespace
     >>> def critical(start_load, peak):
-    ...     nodes = SimpleNamespace(peak=np.array([9.0, peak]), profile=np.array([1.0, 3.0]))
+    ...     nodes = SimpleNamespace(
+    ...         peak=np.array([9.0, peak]), profile=np.array([1.0, 3.0])
+    ...     )
     ...     nodes.initial = np.array([0.0, 2.0])
-    ...     setting = SimpleNamespace(nodes=nodes, mean_initial=1.0, mean_profile=2.0)
+    ...     setting = SimpleNamespace(
+    ...         nodes=nodes, mean_initial=1.0, mean_profile=2.0
+    ...     )
     ...     now = {"run": {"scale": 10.0, "start_load": start_load}}
     ...     now["results"] = {"onset_stress": 7.0}
     ...     return _critical_load(SimpleNamespace(setting=setting), now)
@@ -302,7 +339,9 @@ def summary(run: Run, state: RuptureState) -> dict[str, Any]:
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS
     >>> speeds = {"rupture_speed": [4.0], "median_rupture_speed": [2.0]}
     >>> parts = {"_speeds": lambda run, state: speeds}
-    >>> parts["energy_balance"] = lambda run, state: dict(radiated_energy=8.0, fracture_energy=6.0)
+    >>> parts["energy_balance"] = lambda run, state: dict(
+    ...     radiated_energy=8.0, fracture_energy=6.0
+    ... )
     >>> parts["_critical_load"] = lambda run, now: 33.0
     >>> plain = FunctionType(summary.__code__, globals() | parts)
     >>> problem = SimpleNamespace(solid=SimpleNamespace(shear_modulus=3.0))
@@ -310,8 +349,18 @@ def summary(run: Run, state: RuptureState) -> dict[str, Any]:
     >>> medium = SimpleNamespace(interface=problem.interface, problem=problem)
     >>> results, run = diagnostics[0]["results"], SimpleNamespace(medium=medium)
     >>> state = SimpleNamespace(now=diagnostics[0], slip=np.full(8, 0.5))
-    >>> names = ("critical_load", "critical_stress", "first_instability", "critical_position")
-    >>> names += ("onset_time", "stress_drop", "median_rupture_speed", "seismic_moment")
+    >>> names = (
+    ...     "critical_load",
+    ...     "critical_stress",
+    ...     "first_instability",
+    ...     "critical_position",
+    ... )
+    >>> names += (
+    ...     "onset_time",
+    ...     "stress_drop",
+    ...     "median_rupture_speed",
+    ...     "seismic_moment",
+    ... )
     >>> results["first_stress"], results["critical_stress"] = 5.0, 7.0
     >>> results["kinetic_stress"] = 4.0
     >>> results["onset_time"], results["onset_node"] = 0.125, 3
@@ -371,24 +420,34 @@ def front_speeds(
     The front passes 16 nodes at 3 m/s, and others at 1 m/s. Over 32 m, a quarter
     of the line, it takes at least 16 + 16/3 s. Over 2 h_n = 16 m it takes 16/3 s.
 
-    >>> steps = np.where((np.arange(127) >= 40) & (np.arange(127) < 56), 1.0 / 3.0, 1.0)
+    >>> steps = np.where(
+    ...     (np.arange(127) >= 40) & (np.arange(127) < 56), 1.0 / 3.0, 1.0
+    ... )
     >>> arrival = np.append(0.0, np.cumsum(steps))
     >>> for length in (20.0, 8.0):
     ...     speeds = front_speeds(Interface(128.0, 128), 0, arrival, length)
-    ...     print(f"{speeds['rupture_speed']:.6f} {speeds['median_rupture_speed']:.6f}")
+    ...     print(
+    ...         f"{speeds['rupture_speed']:.6f} {speeds['median_rupture_speed']:.6f}"
+    ...     )
     1.500000 1.000000
     3.000000 1.000000
 
     In a specimen, fronts do not pass from one end to the other, where they
     would be faster here.
 
-    >>> arrival = (np.arange(128) + 64.0) % 128 + np.where(np.arange(128) < 64, -0.9, 0.0)
+    >>> arrival = (np.arange(128) + 64.0) % 128 + np.where(
+    ...     np.arange(128) < 64, -0.9, 0.0
+    ... )
     >>> for ends in ("periodic", "free"):
     ...     interface = Interface(128.0, 128, ends=ends)
-    ...     print(f"{front_speeds(interface, 0, arrival, 16.0)['rupture_speed']:.6f}")
+    ...     print(
+    ...         f"{front_speeds(interface, 0, arrival, 16.0)['rupture_speed']:.6f}"
+    ...     )
     1.028939
     1.000000
-    >>> front_speeds(interface, 0, np.full(128, np.nan), 16.0)["median_rupture_speed"]
+    >>> front_speeds(interface, 0, np.full(128, np.nan), 16.0)[
+    ...     "median_rupture_speed"
+    ... ]
     nan
     """
     spacing, longest = interface.spacings[axis], 0.25 * interface.lengths[axis]
@@ -431,7 +490,9 @@ def rupture_speed(arrival: Floats, spacing: float, window: float) -> tuple[Float
     >>> _, weights = rupture_speed(arrival, 1.0, 2.0)
     >>> round(float(weights[2]), 4)
     0.5
-    >>> rupture_speed(arrival, 1.0, 8.0)[1].tolist() == [0.0] * 8  # a window of the whole line
+    >>> rupture_speed(arrival, 1.0, 8.0)[1].tolist() == [
+    ...     0.0
+    ... ] * 8  # a window of the whole line
     True
     """
     # A window over more than the line would compare a front with itself.

@@ -200,16 +200,29 @@ def _slide(
     >>> strength = {"strength_at": lambda sample, slip, i: (9.0, 2.0, 5.0)[i]}
     >>> plain = FunctionType(_slide.py_func.__code__, globals() | strength)
     >>> mesh = SimpleNamespace(spacing=0.5, step=0.1, viscous_time=0.02)
-    >>> mesh.correction = np.array([[8.0, 8.0, 8.0], [1.0, 2.0, 4.0], [9.0, 9.0, 9.0]])
+    >>> mesh.correction = np.array(
+    ...     [[8.0, 8.0, 8.0], [1.0, 2.0, 4.0], [9.0, 9.0, 9.0]]
+    ... )
     >>> waves = SimpleNamespace(
-    ...     slip=np.array([0.0, 0.1, 0.5]), slip_rate=np.full(3, 7.0), stress=np.zeros(3),
-    ...     corrected=np.array([1.0, 1.0, 2.0]), arrival=np.full(3, np.nan), u=np.zeros((2, 3)),
-    ...     u_rate=np.array([[0.0, 0.2, 0.4]]), totals=np.zeros(1, TOTALS).view(np.recarray),
+    ...     slip=np.array([0.0, 0.1, 0.5]),
+    ...     slip_rate=np.full(3, 7.0),
+    ...     stress=np.zeros(3),
+    ...     corrected=np.array([1.0, 1.0, 2.0]),
+    ...     arrival=np.full(3, np.nan),
+    ...     u=np.zeros((2, 3)),
+    ...     u_rate=np.array([[0.0, 0.2, 0.4]]),
+    ...     totals=np.zeros(1, TOTALS).view(np.recarray),
     ... )
     >>> now = waves.totals[0]
     >>> now.time, now.fast_slip_rate = 5.0, 1.5
-    >>> start, front, force = np.array([4.0, 4.0, 1.0]), np.full(3, 0.2), np.array([-1.0, 1.0, 0.0])
-    >>> int(plain(None, start, front, mesh, waves, force, 0.9, 0.5))  # a node that never slipped
+    >>> start, front, force = (
+    ...     np.array([4.0, 4.0, 1.0]),
+    ...     np.full(3, 0.2),
+    ...     np.array([-1.0, 1.0, 0.0]),
+    ... )
+    >>> int(
+    ...     plain(None, start, front, mesh, waves, force, 0.9, 0.5)
+    ... )  # a node that never slipped
     1
     >>> waves.slip.round(6).tolist(), waves.slip_rate.round(6).tolist()
     ([0.0, 0.286, 0.5], [0.0, 1.86, 0.0])
@@ -219,9 +232,15 @@ def _slide(
     [nan, 5.053763, nan]
     >>> waves.u[0].round(6).tolist(), waves.u_rate[0].round(6).tolist()
     ([0.0, 0.1076, -0.008], [0.0, 0.93, 0.0])
-    >>> waves.corrected.round(6).tolist(), round(float(now.friction), 6)  # 0.0565 + 0.0044
+    >>> (
+    ...     waves.corrected.round(6).tolist(),
+    ...     round(float(now.friction), 6),
+    ... )  # 0.0565 + 0.0044
     ([1.186, 1.372, 2.744], 0.0609)
-    >>> [round(float(now[name]), 6) for name in ("peak_rate", "fast_since", "fast_until", "fast")]
+    >>> [
+    ...     round(float(now[name]), 6)
+    ...     for name in ("peak_rate", "fast_since", "fast_until", "fast")
+    ... ]
     [1.86, 5.0, 5.0, 1.0]
     """
     dx, step = mesh.spacing, mesh.step
@@ -281,7 +300,9 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
     ((20 + 2.5 - 3) * 1 + 3)/(20 + 2.5 + 3) with the damping.
 
     >>> from types import SimpleNamespace
-    >>> mesh = SimpleNamespace(step=0.5, stiffness=10.0, drive_mass=4.0, viscous_time=0.25)
+    >>> mesh = SimpleNamespace(
+    ...     step=0.5, stiffness=10.0, drive_mass=4.0, viscous_time=0.25
+    ... )
     >>> mesh.mass, mesh.attenuation = np.array([9.0, 3.0]), 1.0
     >>> waves = SimpleNamespace(u=np.zeros((2, 2)), u_rate=np.zeros((2, 2)))
     >>> waves.totals = np.zeros(1, TOTALS).view(np.recarray)
@@ -340,7 +361,9 @@ def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
     0.25 * 2. The force keeps the pusher at their speed.
 
     >>> from types import SimpleNamespace
-    >>> mesh = SimpleNamespace(step=0.5, stiffness=4.0, drive_mass=1.0, viscous_time=0.25)
+    >>> mesh = SimpleNamespace(
+    ...     step=0.5, stiffness=4.0, drive_mass=1.0, viscous_time=0.25
+    ... )
     >>> mesh.push, gains = np.array([[0.0, 0.0], [0.75, 0.25]]), np.array([9.0, 2.0])
     >>> u_rate = np.array([[5.0, 5.0, 5.0], [1.0, 6.0, -2.0]])
     >>> waves = SimpleNamespace(u=np.zeros((2, 3)), u_rate=u_rate)
@@ -348,15 +371,24 @@ def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
     >>> now = waves.totals[0]
     >>> now.speed, now.travel = 0.5, 0.125
     >>> _move_pusher.py_func(mesh, waves, gains)
-    >>> mobility, a, before = 0.75**2 * 2 + 0.25**2 * 2, 0.5 * 4.0 * 0.5 + 1.0 / 0.5, 0.75 - 0.5
+    >>> mobility, a, before = (
+    ...     0.75**2 * 2 + 0.25**2 * 2,
+    ...     0.5 * 4.0 * 0.5 + 1.0 / 0.5,
+    ...     0.75 - 0.5,
+    ... )
     >>> force = -(4.0 * 0.125 + a * (before - 0.5)) / (1.0 + a * mobility)
-    >>> np.allclose(now.speed, before + mobility * force), np.allclose(now.force, -4.0 * now.travel)
+    >>> (
+    ...     np.allclose(now.speed, before + mobility * force),
+    ...     np.allclose(now.force, -4.0 * now.travel),
+    ... )
     (True, True)
     >>> np.allclose(now.travel, 0.125 + 0.5 * now.speed)
     True
     >>> np.allclose(waves.u_rate[1], [1.0 + 1.5 * force, 6.0, -2.0 + 0.5 * force])
     True
-    >>> np.allclose(waves.u, [[0.0] * 3, [0.75 * 1.5 * force, 0.0, 0.75 * 0.5 * force]])
+    >>> np.allclose(
+    ...     waves.u, [[0.0] * 3, [0.75 * 1.5 * force, 0.0, 0.75 * 0.5 * force]]
+    ... )
     True
 
     A rigid machine holds the pusher.
@@ -413,19 +445,39 @@ def wave_steps(
     >>> def steps(platen, anti_plane, most, ends):
     ...     def part(name):
     ...         return lambda *arguments: called.append(name)
+    ...
     ...     def slide(*arguments):
     ...         called.append("slide")
     ...         return left.pop(0)
+    ...
     ...     called, left = [], [1, 0, 0]
     ...     parts = "_force", "_move", "_move_platen", "_move_pusher"
-    ...     names = globals() | {name: part(name[1:]) for name in parts} | {"_slide": slide}
+    ...     names = (
+    ...         globals()
+    ...         | {name: part(name[1:]) for name in parts}
+    ...         | {"_slide": slide}
+    ...     )
     ...     plain = FunctionType(wave_steps.py_func.__code__, names)
-    ...     mesh = SimpleNamespace(platen=platen, anti_plane=anti_plane, step=0.5, viscous_time=0.0)
-    ...     mesh.attenuation, mesh.mass, mesh.stencils = 0.0, np.ones(3), np.zeros((3, 2, 5, 3))
-    ...     fields = dict(zip(("u", "v", "u_rate", "v_rate"), np.zeros((4, 3, 2)), strict=True))
-    ...     waves = SimpleNamespace(**fields, totals=np.zeros(1, TOTALS).view(np.recarray))
+    ...     mesh = SimpleNamespace(
+    ...         platen=platen, anti_plane=anti_plane, step=0.5, viscous_time=0.0
+    ...     )
+    ...     mesh.attenuation, mesh.mass, mesh.stencils = (
+    ...         0.0,
+    ...         np.ones(3),
+    ...         np.zeros((3, 2, 5, 3)),
+    ...     )
+    ...     fields = dict(
+    ...         zip(("u", "v", "u_rate", "v_rate"), np.zeros((4, 3, 2)), strict=True)
+    ...     )
+    ...     waves = SimpleNamespace(
+    ...         **fields, totals=np.zeros(1, TOTALS).view(np.recarray)
+    ...     )
     ...     taken = plain(None, None, None, mesh, waves, most, ends)
-    ...     return taken, float(waves.totals[0].time), " ".join(called[: len(called) // taken])
+    ...     return (
+    ...         taken,
+    ...         float(waves.totals[0].time),
+    ...         " ".join(called[: len(called) // taken]),
+    ...     )
     >>> steps(platen=True, anti_plane=True, most=1, ends=False)
     (1, 0.5, 'force force slide force move move_platen')
     >>> steps(platen=False, anti_plane=True, most=3, ends=True)
