@@ -257,8 +257,10 @@ def gather(
     [5.0, nan, nan, 7.0, 6.0, nan, nan, nan]
     >>> found.attrs["pilot_bias"], found.attrs["cut_short"], notes
     (0.5, '3 of 8 samples are done', ['saved'])
-    >>> [str(text).partition("NaN")[0] for text in texts], str(texts[0])[-11:]
-    (['4 of 8 samples could not be solved and are '], ' and 1 more')
+    >>> [str(text).partition("NaN")[0] for text in texts]
+    ['4 of 8 samples could not be solved and are ']
+    >>> str(texts[0]).count("no root"), str(texts[0])[-12:]
+    (3, '| and 1 more')
     """
     rows, cores = Gathered(points, samples), workers or usable_cores()
     # Samples that are stored, or that another job computes, are not missing.
