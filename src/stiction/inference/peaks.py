@@ -224,8 +224,8 @@ def peaks_and_error(
     >>> names = np.array(["a", "c", "a"]), np.array(["b", "b"])
     >>> loads = Peaks((0.1, 0.2), values, "N", specimens=names)
     >>> means, error = peaks_and_error(loads, None, 0.7)
-    >>> [mean.tolist() for mean in means.values], means.specimens, means.loads is loads
-    ([[20.0, 30.0], [40.0]], None, True)
+    >>> [mean.tolist() for mean in means.values], not means.specimens, means.loads is loads
+    ([[20.0, 30.0], [40.0]], True, True)
     >>> of_means = math.sqrt(4 * 0.05**2 / (5 - 3) * (0.5 + 0.5 + 1.0) / 3) * 30.0
     >>> round(error - math.hypot(0.7, of_means), 12)
     0.0

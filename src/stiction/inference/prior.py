@@ -295,7 +295,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     ((0,), [[0.0, 1.5]])
 
     An upper bound of 3.4 MPa gives 0.4 + 3 s = -0.2 + 1.5 (0.4 + 2 s). The
-    density of the solid and the length of the interface change nothing else:
+    density of the solid does not scale the onset:
 
     >>> more = {"problem.solid.density": (900, 1300)} | high
     >>> scaling((4e5, 2.4e6), [950.0, 3.4e6], more)

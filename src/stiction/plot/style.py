@@ -68,9 +68,9 @@ def paper_style() -> Iterator[None]:
 
     >>> with matplotlib.style.context({"font.size": 30.0, "lines.marker": "x"}):
     ...     with paper_style():
-    ...         matplotlib.rcParams["font.size"], matplotlib.rcParams["lines.marker"]
+    ...         matplotlib.rcParams["font.size"], matplotlib.rcParams["lines.marker"] == "x"
     ...     matplotlib.rcParams["font.size"]
-    (8.5, 'None')
+    (8.5, False)
     30.0
     """
     with matplotlib.style.context(["default", _RC]):
