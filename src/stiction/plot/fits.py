@@ -172,19 +172,20 @@ def _correlation(
 def _pooled_spectrum(observed: list[Observed], powers: list[Array]) -> Array:
     """Return band averages (2, bands) of wavenumber (rad/m) and spectral density.
 
-    Wavenumbers 1, 2 and 4 (rad/m) are two octaves, and 2.1 falls to 2. Records
-    weight a band. The density is the power times the spacing:
+    Wavenumbers 2 and 2.1 (rad/m) lie in the same quarter of an octave, and 2.3
+    in the next. Records weight a band. The density is the power times the
+    spacing:
 
     >>> from types import SimpleNamespace
     >>> def window(k, spacing):
     ...     k = np.array(k)
     ...     return SimpleNamespace(weights=1.0 * (k > 0.0), wave_vectors=(k,), spacings=(spacing,))
-    >>> first, second = window([0.0, 1.0, 2.0], 0.5), window([0.0, 2.1, 4.0], 0.25)
+    >>> first, second = window([0.0, 1.0, 2.0], 0.5), window([0.0, 2.1, 2.3], 0.25)
     >>> observed = [Observed(first, 3, None, 0.0), Observed(second, 1, None, 0.0)]
     >>> powers = [np.array([99.0, 8.0, 4.0]), np.array([99.0, 4.0, 2.0])]
     >>> k, density = _pooled_spectrum(observed, powers)
     >>> k.round(9).tolist(), density.round(9).tolist()  # (3 x 2 + 2.1)/4, (3 x 2 + 1)/4
-    ([1.0, 2.025, 4.0], [4.0, 1.75, 0.5])
+    ([1.0, 2.025, 2.3], [4.0, 1.75, 0.5])
 
     On a plane the length of the wave vector counts:
 

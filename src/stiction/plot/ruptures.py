@@ -294,12 +294,12 @@ def _clock(figure: Figure, run: xr.Dataset) -> tuple[Any, str, list[str]]:
     """Return the text at the top of a figure, and its content by frame: time and mean stress.
 
     >>> figure = Figure()
-    >>> run = xr.Dataset({"onset_time": 1e-4, "time": ("time", [0.99e-4, 1e-4, 1.25e-4]),
+    >>> run = xr.Dataset({"onset_time": 1e-2, "time": ("time", [8e-3, 1e-2, 1.0025e-2]),
     ...                   "mean_stress": ("time", [2e6, 1.5e6, -0.1])})
     >>> title, name, texts = _clock(figure, run)
     >>> for text in texts:
     ...     print(text)
-    -1.0 µs since the onset,  mean stress 2.000 MPa
+    -2,000.0 µs since the onset,  mean stress 2.000 MPa
     0.0 µs since the onset,  mean stress 1.500 MPa
     25.0 µs since the onset,  mean stress 0.000 MPa
     >>> name, title.get_text() == texts[0]
@@ -324,12 +324,12 @@ def _line_film(run: xr.Dataset) -> tuple[Figure, Moving]:
 
     >>> run = xr.Dataset(
     ...     {"slip_rate": (("time", "x"), [[0.0, 1.0, 2.0], [0.0, 3.0, 0.5]]), "onset_time": 0.0,
-    ...      "shear_stress": (("time", "x"), [[1e6, 2e6, 3e6], [2e6, 1e6, 4e6]]),
+    ...      "shear_stress": (("time", "x"), [[9e6, 2e6, 3e6], [2e6, 1e6, 4e6]]),
     ...      "peak_strength": ("x", [np.inf, 3e6, 5e6]), "mean_stress": ("time", [2e6, 2.1e6])},
     ...     {"time": [0.0, 1e-3], "x": [0.0, 0.1, 0.2]})
     >>> figure, moving = _line_film(run)
     >>> [name for _, name, _ in moving], moving[0][2].tolist()
-    (['ydata', 'ydata', 'text'], [[1.0, 2.0, 3.0], [2.0, 1.0, 4.0]])
+    (['ydata', 'ydata', 'text'], [[9.0, 2.0, 3.0], [2.0, 1.0, 4.0]])
     >>> moving[1][2].tolist()  # zero on a logarithmic scale
     [[3e-10, 1.0, 2.0], [3e-10, 3.0, 0.5]]
     >>> above, below = figure.axes
