@@ -126,6 +126,10 @@ def _factors(given: Any) -> tuple[str, ...]:
 
     >>> _factors(False), _factors("normal"), _factors(True) == families_of(True)
     ((), ('normal',), True)
+    >>> _factors([])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: must be True, False, or some of ...
     """
     return () if given is False else families_of(given)
 
@@ -449,6 +453,9 @@ class FieldFit(WithFactors, Result):
         >>> fit.parameters = {"mean": 2e6}
         >>> FieldFit._summary(fit).rows[0].name, FieldFit._summary(fit).notes
         ('mean', ['p-values: marginal 0.25, level 0.5 (2 repetitions)'])
+        >>> fit.families, fit.tied = families, ("lognormal",)
+        >>> FieldFit._summary(fit).notes[0]
+        'scores of families: lognormal 0.0, beta -1.5'
         """
         marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")
         spectrum = getattr(self.field.spectrum, "type", "").replace("_", " ")
@@ -798,11 +805,13 @@ def _doubts(fitted: BestFit, p_values: Mapping[str, float]) -> list[str]:
     ...         noise=math.sqrt(2.0 * noise_share), noise_share=noise_share, variance=2.0,
     ...         signal=lambda window: np.array([9.0, 8.0, 4.0, 1.9]))
     ...     spectrum = SimpleNamespace(at_end=lambda model: dict(ends))
-    ...     setting = SimpleNamespace(windows=(Window(), Window()), spectrum=spectrum)
+    ...     setting = SimpleNamespace(windows=(Window(), Last()), spectrum=spectrum)
     ...     fitted = SimpleNamespace(lengths_held=held, model=model, setting=setting)
     ...     return [text.split(",")[0].split(". ")[0] for text in _doubts(fitted, p_values)]
     >>> class Window:
     ...     weights = np.array([0.0, 0.5, 1.0, 1.0])
+    >>> class Last:
+    ...     weights = np.array([0.0, 0.0, 0.0, 1.0])
     >>> doubts(marginal=0.02, spectrum=0.5)
     []
     >>> doubts(9.9), doubts(marginal=0.01, spectrum=0.5)
@@ -813,8 +822,8 @@ def _doubts(fitted: BestFit, p_values: Mapping[str, float]) -> list[str]:
     The power at the cut-off is 2*4 times the fraction of the field,
     and the noise has the variance 2 times its fraction.
 
-    >>> doubts(noise_share=0.75), doubts(noise_share=0.85)
-    ([], ['the noise (1.3) hides the cut-off of the spectrum'])
+    >>> doubts(noise_share=0.75), doubts(noise_share=0.82)
+    ([], ['the noise (1.28) hides the cut-off of the spectrum'])
     """
     doubts = []
     held, noise = fitted.lengths_held, fitted.model.noise

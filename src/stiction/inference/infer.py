@@ -273,6 +273,10 @@ def _of_parameters(
     4.50 1.000 1.000 0.1
     >>> boxes[0], boxes[1][1] < 0.45 < boxes[-1][1] < 1.0, len(boxes) > 2
     ([0.0, 1.0], True, True)
+    >>> (low,), (high,) = grid_of(Normal(at=0.3, top=0.0), prior.whole).box
+    >>> width = high - low
+    >>> bool(np.allclose(boxes[1], [low - 0.1 * width, high + 0.1 * width]))
+    True
     >>> posterior(False, refused=["peak 9 is out of reach"])
     Traceback (most recent call last):
         ...
