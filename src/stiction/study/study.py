@@ -372,10 +372,13 @@ class Study(_Parts):
             ...
         stiction.base.errors.InputError: Study: reliability: has no effect on given profiles
         Study: samples: must be 1, because profiles are given
-        >>> Study(**given)
-        Traceback (most recent call last):
-            ...
-        stiction.base.errors.InputError: Study: random: give either random properties or profiles
+        >>> for both in ({}, {"profiles": profiles, "random": st.paper.strength(given["problem"])}):
+        ...     try:
+        ...         Study(**given, **both)
+        ...     except InputError as error:
+        ...         print(error)
+        Study: random: give either random properties or profiles
+        Study: random: give either random properties or profiles
         """
         unused = [f"{name}: has no effect on given profiles" for name in ("reliability", "peaks")
                   if getattr(self, name) is not None]  # fmt: skip
