@@ -239,8 +239,10 @@ class Result:
                           value       unit
       correlation_length  12          mm
       values              [1.0, nan]
-    >>> fit.to_dict(), Fit(1.0, {"inner": Fit(2.0)}).to_dict()["values"]["inner"]["values"]
-    ({'correlation_length': 0.012, 'values': [1.0, None]}, None)
+    >>> list(fit.to_dict()), fit.to_dict()["values"] == [1.0, None]
+    (['correlation_length', 'values'], True)
+    >>> Fit(1.0, {"inner": Fit(2.0)}).to_dict()["values"]["inner"]["correlation_length"]
+    2.0
     """
 
     def _summary(self) -> Summary:
