@@ -61,6 +61,8 @@ class Page:
     >>> print([part["kind"] for part in page.parts], ascii(page.parts[1]["rows"]), sep="\n")
     ['text', 'table', 'listing', 'figure']
     [['first', '1,234,567'], ['second', '\u2013']]
+    >>> page.parts[0]["warning"]
+    True
     >>> parts = "A &amp; B", "Slip \ufffd[2J, &lt;b&gt;", "1,234,567", "samples = 3"
     >>> [part in html for part in parts], "data:image/png;base64,iVBOR" in html, "\x1b" in html
     ([True, True, True, True], True, False)
@@ -165,6 +167,8 @@ def densities(result: xr.Dataset) -> Figure:
     >>> figure = densities(xr.Dataset(cells))
     >>> [axes.get_title(loc="left") for axes in figure.axes], figure.axes[0].get_legend() is None
     (['(a)', '(b)'], True)
+    >>> [axes.get_xlabel().partition(" (")[0] for axes in figure.axes]
+    ['critical stress', 'critical position']
     """
     parts = components(result[[shown_quantity(result), "critical_position"]])
     figure = Figure(figsize=(PAGE, 2.6))
@@ -329,10 +333,17 @@ def _inputs(problem: Problem, sources: Mapping[str, str]) -> Iterator[list[Any]]
     >>> problem = st.paper.problem(nodes=576)
     >>> sources = {"solid.shear_modulus": "tension test", "interface.length": "drawing"}
     >>> inputs = {key: rest for key, *rest in _inputs(problem, sources)}
+    >>> moduli = inputs["solid.youngs_modulus"][0] / inputs["solid.shear_modulus"][0]
+    >>> round(moduli, 9) == round(2.0 * (1.0 + problem.solid.poisson_ratio), 9)
+    True
     >>> [inputs[key][1:] for key in ("solid.youngs_modulus", "solid.shear_modulus")]
     [['Pa', 'tension test'], ['Pa', 'tension test']]
     >>> [inputs[key][1:] for key in ("interface.length", "solid.poisson_ratio", "solid.density")]
     [['m', 'drawing'], ['', 'assumed'], ['kg m-3', 'assumed']]
+    >>> import dataclasses
+    >>> uneven = dataclasses.replace(problem, load=st.Load(normal_pressure=[2e6, 4e6] * 288))
+    >>> [value for key, value, *_ in _inputs(uneven, {}) if key == "load.normal_pressure"]
+    ['576 values, mean 3e+06']
     >>> list(_inputs(problem, {"solid.mass": "scale"}))  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
