@@ -601,6 +601,9 @@ class PiecewiseWeakening(FrictionLaw):
         2.164043 0.257374 (0.5, 0.0)
         8.079442 0.257374 (0.5, 0.0)
         3.059581 0.257374 (0.5, 0.0)
+        >>> law = st.LinearWeakening(fracture_energy=3.0)
+        >>> float(st.PiecewiseWeakening.from_law(law, 2).fracture_energy)
+        3.0
         """
         if problems := contradictions(law):
             raise InputError([f"law: {text}" for text in problems])
