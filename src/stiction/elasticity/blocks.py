@@ -183,6 +183,14 @@ def block_response(
     ...     print(off < 0.012, off_q < 0.006, abs(off_C - 1.0) < 0.005)
     True True True
     True True True
+
+    A short block, also by finite elements:
+
+    >>> whole = block(Body(0.5, 3.0, 1.8), 0.2 / n, n)
+    >>> top = np.arange(2 * n + 1) > n
+    >>> C = float(eliminated(whole[n : 3 * n + 1, n : 3 * n + 1], top).sum())
+    >>> round(block_response(0.2, n, 0.5, 3.0, 1.8, None).drive_stiffness / C, 2)
+    1.0
     """
     with one_blas_thread():
         response, coarse = (

@@ -106,9 +106,12 @@ def weakest_window(
     Windows with fixed places have one mean each. Windows after one that is unstable
     everywhere are not tried, unless they need the same rate.
 
-    >>> fixed = window([2.0, 1.0, 1.0, 0.5], [1, 3, 2, 4], [1, 2, 2, 1], 4 * [[0.5, 0.5]])
+    >>> fixed = window([2.0, 1.0, 1.0, 0.5], [1, 2, 3, 4], [1, 2, 2, 1], 4 * [[0.5, 0.5]])
     >>> weakest(fixed, 6 * [1.0])
-    (2.5, 1, 3)
+    (2.5, 2, 3)
+    >>> pair = window([1.0], [3], [2], [[0.5, 0.5]])
+    >>> weakest(pair, [0.5, 0.5, 0.5, 1.0, 1.0, 0.5])
+    (2.5, 0, 3)
     >>> weakest(fixed, [1.0, 1.0, 1.0, 0.5, 1.0, 1.0])
     (1.0, 3, 4)
 
@@ -198,6 +201,13 @@ def window_bound(
     [1.0, 1.0, 1.0]
     >>> window_bound(np.array([1.0, 9.0, 2.0]), one, 2.0 * one, single, np.empty(3), y), y.tolist()
     (1.5, [0.5, 0.0, 0.5])
+
+    The second window has weights of its own, and needs a lower rate.
+
+    >>> rates, modes = np.array([2.0, 1.0]), np.array([[1.0, 0.0], [0.25, 0.75]])
+    >>> two = Windows(rates, np.array([-1, -1]), np.array([1, 2]), modes)
+    >>> window_bound(np.array([8.0, 1.0, 9.0]), one, one, two, np.empty(3), y), y.tolist()
+    (2.75, [0.25, 0.75, 0.0])
     """
     n = W.shape[0]
     # 4.
