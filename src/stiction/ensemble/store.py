@@ -83,7 +83,7 @@ class Store:
     >>> store = Store.open(Path(folder.name) / "run", study)
     >>> def table(number, **columns):
     ...     columns = {name: np.array([value]) for name, value in columns.items()}
-    ...     columns |= {POINT: np.array([0]), NUMBER: np.array([number])}
+    ...     columns |= {POINT: np.array([0], np.int64), NUMBER: np.array([number], np.int64)}
     ...     return Table(columns, (Failure(0, 7, 9, "no root"),), 0.25 * number, versions())
     >>> for one in (table(1, stress=2.0), table(2, stress=3.0), table(0, load=4.0)):
     ...     store.add(one)
@@ -312,7 +312,10 @@ def _table_in(data: bytes) -> tuple[str, Table]:
     Raise one of several errors for other content.
 
     >>> def chunk(mark="m", made_by="v", seconds=0.5, failures=(), **columns):
-    ...     columns = {POINT: np.array([3]), NUMBER: np.array([7])} | columns
+    ...     columns = {
+    ...         POINT: np.array([3], np.int64),
+    ...         NUMBER: np.array([7], np.int64),
+    ...     } | columns
     ...     about, file = json.dumps([mark, made_by, seconds, failures]).encode(), io.BytesIO()
     ...     np.savez(file, about=np.frombuffer(about, dtype=np.uint8), rows=_rows(columns))
     ...     return file.getvalue()
