@@ -424,7 +424,7 @@ class SliderSolver:
 
     At 10 N/m it slides. Slip at 2.5 N/m is (2.5 - 1)/3 m at cell 2:
 
-    >>> known = solver.at_loads(None, np.array([1.0, 2.5, 10.0]) / 0.8)
+    >>> known = solver.at_loads(None, np.array([1.8, 2.5, 10.0]) / 0.8)
     >>> known["slip"][:, 2].round(6).tolist()
     [0.0, 0.5, nan]
     >>> known["sliding"].tolist()
@@ -438,9 +438,9 @@ class SliderSolver:
     >>> known["event_position"].round(6).tolist()
     [0.25, 0.55]
     >>> known["travel"].round(6).tolist()
-    [0.25, 1.125, nan]
+    [0.45, 1.125, nan]
     >>> known["crosshead_travel"].round(6).tolist()
-    [0.35, 1.375, nan]
+    [0.63, 1.375, nan]
     >>> known["stress"][1, :4].round(6).tolist()
     [25.0, 25.0, 10.0, 25.0]
     >>> known["pressure"][1, :3].round(6).tolist()
