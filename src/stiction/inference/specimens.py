@@ -904,8 +904,8 @@ class Prediction(NamedTuple):
         if family is not None:
             mass_of = {family: mass_of[family] / mass_of[family].sum()}
         x = np.linspace(means[0] - LOWEST, means[-1] + LOG_MEAN_MARGIN, PREDICTED)
-        # Probability that x of a further specimen lies below each
-        # point, for each field.
+        # Probability that x of a further specimen lies below the upper
+        # edge of each cell, for each field.
         below, half = np.zeros((len(profiles.fields), x.size)), 0.5 * (x[1] - x[0])
         for name, of_family in mass_of.items():
             for cell, cv in enumerate(profiles.prior.cells()):
@@ -925,7 +925,7 @@ class Prediction(NamedTuple):
                 at += np.minimum(log_peak - logs[:, 0], 0.0)
                 at += np.maximum(log_peak - logs[:, -1], 0.0)
             pairs = zip(at, below, strict=True)
-            shares = [np.interp(row, x, part).sum() for row, part in pairs]
+            shares = [np.interp(row, x + half, part).sum() for row, part in pairs]
             return float(sum(shares)) / logs.shape[2]
 
         return chance, (x[0] + logs.min() - known.at[0], x[-1] + logs.max() - known.at[-1])

@@ -201,8 +201,8 @@ def amplification(kappa: float, kernel: ExponentialSum, stiffness: float) -> Flo
     Without memory, V* is -K (d + kappa V), the mean rate is (V + V*)/2, and V
     becomes -K (d + kappa mean).
 
-    >>> nothing = ExponentialSum(np.array([-1.0 + 0j]), np.zeros(1) + 0j, 0.0)
-    >>> amplification(0.25, nothing, 2.0)[:2, :2].tolist()
+    >>> absent = ExponentialSum(np.array([-1.0 + 0j]), np.zeros(1) + 0j, 0.0)
+    >>> amplification(0.25, absent, 2.0)[:2, :2].tolist()
     [[-0.125, -1.5], [0.0625, 0.75]]
 
     With s = -1 and w = 1 the memory decays by E = exp(-kappa), and a unit rate
@@ -237,8 +237,8 @@ def amplification(kappa: float, kernel: ExponentialSum, stiffness: float) -> Flo
 def _stable(kappa: float, kernel: ExponentialSum, stiffness: float) -> bool:
     """Return whether no mode grows in an explicit step.
 
-    >>> nothing = ExponentialSum(np.array([-1.0 + 0j]), np.zeros(1) + 0j, 0.0)
-    >>> _stable(0.99, nothing, 2.0), _stable(1.01, nothing, 2.0)
+    >>> absent = ExponentialSum(np.array([-1.0 + 0j]), np.zeros(1) + 0j, 0.0)
+    >>> _stable(0.99, absent, 2.0), _stable(1.01, absent, 2.0)
     (True, False)
     """
     matrix = amplification(kappa, kernel, stiffness)
@@ -252,12 +252,12 @@ def _largest_kappa(kernel: ExponentialSum, stiffness: float) -> float:
     Without memory d is multiplied by 1 - x + x²/2 in a step, with x = kappa K,
     which is at most 1 for x = 2. A growing memory is never stable.
 
-    >>> nothing, growing = (
+    >>> absent, growing = (
     ...     ExponentialSum(np.array([pole + 0j]), np.zeros(1) + 0j, 0.0)
     ...     for pole in (-1.0, 1.0)
     ... )
     >>> print(
-    ...     f"{_largest_kappa(nothing, 2.0):.3f} {_largest_kappa(nothing, 0.8):.3f}"
+    ...     f"{_largest_kappa(absent, 2.0):.3f} {_largest_kappa(absent, 0.8):.3f}"
     ... )
     1.000 2.500
     >>> _largest_kappa(growing, 2.0)
