@@ -324,11 +324,11 @@ def _large(content: bytes, options: Options, source: str) -> Table | None:
 
     Small texts, remarks and uneven lines are left to the slower reader:
 
-    >>> [_large(b"".join(lines[:5000] + end), Options(), "") for end in ([], [b"# end"])]
-    [None, None]
+    >>> [bool(_large(b"".join(lines[:5000] + e), Options(), "")) for e in ([], [b"# end"])]
+    [False, False]
     >>> ends = [b"# end"], [b"8\n"], [b"8;a\n"]
-    >>> [_large(b"".join(lines + end), Options(), "") for end in ends]
-    [None, None, None]
+    >>> [bool(_large(b"".join(lines + end), Options(), "")) for end in ends]
+    [False, False, False]
     >>> missing = _large(b"".join([*lines, b"8;Bad\n"]), Options(missing="BAD"), "")
     >>> missing.columns[1].values[-2:].tolist()
     [4.5, nan]
