@@ -340,8 +340,8 @@ def _warn_once(text: str) -> None:
     >>> with warnings.catch_warnings(record=True) as shown:
     ...     warnings.simplefilter("always")
     ...     _warn_once.__wrapped__("full")
-    ...     _warn_once("slow"), _warn_once("slow")
-    (None, None)
+    ...     for text in ("slow", "slow"):
+    ...         _warn_once(text)
     >>> [str(warning.message) for warning in shown][:2]
     ['cache: full', 'cache: slow']
     """

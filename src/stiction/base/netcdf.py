@@ -218,8 +218,8 @@ def _check_chunks(dataset: Any, made: Any) -> None:
     ...             return _check_chunks(item, item.id.get_create_plist())
     ...         except InputError as error:
     ...             return str(error)
-    >>> check(compression="gzip", shuffle=True, fletcher32=True), check(shuffle=True)
-    (None, None)
+    >>> bool(check(compression="gzip", shuffle=True, fletcher32=True) or check(shuffle=True))
+    False
     >>> check(compression="lzf")
     "'/load' is compressed by an unsupported filter. Compress it by zlib"
     >>> [check(lambda item: item.id.write_direct_chunk((4,), zlib.compress(bytes(size))),

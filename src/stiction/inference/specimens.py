@@ -881,7 +881,7 @@ class Prediction(NamedTuple):
         ...     (-1.3, 2.0 * math.exp(-1.3)), (1.3, 3.0 * math.exp(1.3)), (0.0, math.sqrt(6.0)),
         ... ):
         ...     found = probability([-1.0, 1.0], [[2.0], [3.0]], onset)
-        ...     print(round(found - float(below(log_c)), 2) + 0.0)
+        ...     print(round(found - float(below(log_c)), 4) + 0.0)
         0.0
         0.0
         0.0
@@ -889,7 +889,7 @@ class Prediction(NamedTuple):
         If the onset is 2 c or 4 c, the probability is the mean of both:
 
         >>> found = probability([0.0], [[2.0, 4.0]], 3.0)
-        >>> round(found - float(below(np.log([1.5, 0.75])).mean()), 2) + 0.0
+        >>> round(found - float(below(np.log([1.5, 0.75])).mean()), 4) + 0.0
         0.0
         """
         chance, _ = self._distribution()

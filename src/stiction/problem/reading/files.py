@@ -299,7 +299,7 @@ def _check_line(number: int, line: str, separator: str) -> None:
     line 3 has a cell of 1001 characters, more than 1000
     line 3 has a cell of 1001 characters, more than 1000
     """
-    cells = line.rstrip(separator).split(separator.strip(" ") or None)
+    cells = line.rstrip(separator).split(None if separator == " " else separator or "\n")
     if len(cells) > MAX_COLUMNS:
         raise InputError(
             f"line {number} has {len(cells)} columns, more than {MAX_COLUMNS}. Write each value"
