@@ -154,7 +154,7 @@ def test_the_warning_of_a_missing_mean_states_the_variance_of_the_mean(anisotrop
     plane = st.Interface(length=(0.05, 0.05), nodes=(64, 64))
     field = beta_strength(0.03, anisotropy=anisotropy)
     share = dataclasses.replace(field, mean_mode=True).modes(plane).sigma[0] ** 2
-    with pytest.warns(st.AccuracyWarning, match=rf"would hold {100.0 * share:.2g} %"):
+    with pytest.warns(st.AccuracyWarning, match=rf"would hold {100.0 * share:.3g} %"):
         field.sample(plane)
 
 
@@ -169,7 +169,7 @@ def test_waves_that_one_direction_does_not_resolve_are_warned_of(shape):
     beyond = (np.abs(i) > shape[0] // 2) | (np.abs(j) > shape[1] // 2)
     share = power[beyond].sum() / power.sum()
     assert field.modes(plane).unresolved[0] == pytest.approx(share, rel=1e-9)
-    with pytest.warns(st.AccuracyWarning, match=rf"{100.0 * share:.2g} %"):
+    with pytest.warns(st.AccuracyWarning, match=rf"{100.0 * share:.3g} %"):
         field.sample(plane)
 
 

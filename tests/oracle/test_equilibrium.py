@@ -119,7 +119,7 @@ def test_nodes_that_do_not_weaken(make_strength, law):
     tau_p = 2.0 * make_strength(0.5).sample(problem.interface, samples=2, seed=16) - 0.8e6
     constant = tau_p <= 0.8e6
     assert constant.any(axis=1).all()
-    words = f"{100.0 * constant.mean():.2g} % of the nodes"
+    words = f"{100.0 * constant.mean():.3g} % of the nodes"
     with pytest.warns(st.AccuracyWarning, match=words):
         onset = exact_onset(problem, tau_p)
     assert np.all(onset.certificate_gap < 1e-9 * onset.critical_load)
