@@ -148,7 +148,7 @@ def follow_to_sliding(
     ...     search = SimpleNamespace(next=lambda *_: next(states), jump=jump)
     ...     path = follow_to_sliding(search, sample, to_rest)
     ...     print(path.first.load, path.last.load, path.peak, len(path.events))
-    ...     print(path.known, path.arrival, path.sliding is not None, asked)
+    ...     print(path.known, path.arrival or "-", path.sliding is not None, asked)
     >>> ends, circle, (slides, arrested) = [3, 3, np.inf], [3, 3, 3], list(Outcome)[:2]
     >>> follow(circle, [state(3.0, peak=7.0), state(5.0)], [arrested, slides], some, True)
     3.0 5.0 7.0 1
@@ -163,10 +163,10 @@ def follow_to_sliding(
     False time False [False, False]
     >>> follow(circle, [state(3.0, PathStatus.STABLE)], [])
     3.0 3.0 3.0 0
-    True None False []
+    True - False []
     >>> follow(circle, [state(3.0), state(6.0, PathStatus.GIVEN_UP)], [arrested])
     3.0 6.0 6.0 1
-    False None False [False]
+    False - False [False]
 
     If an interface ends, it slides in the event in which every node slips, or
     else in the last event:
@@ -177,10 +177,10 @@ def follow_to_sliding(
     >>> stable = state(6.0, PathStatus.STABLE)
     >>> follow(ends, [state(3.0), state(4.0), stable], [arrested, arrested])
     3.0 4.0 6.0 1
-    True None True [False, False]
+    True - True [False, False]
     >>> follow(ends, [state(3.0), state(6.0, PathStatus.GIVEN_UP)], [arrested])
     3.0 6.0 6.0 1
-    False None False [False]
+    False - False [False]
     """
     ends, sliding = not np.isfinite(sample.excess).all(), None
     first: EquilibriumState | None = None
