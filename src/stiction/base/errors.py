@@ -101,8 +101,8 @@ def unknown(given: str, valid: Iterable[str]) -> str:
 
     Names with over 60 letters are cut.
 
-    >>> unknown("strenght", ["mean", "strength"])
-    "unknown 'strenght'; did you mean 'strength'? (valid: mean, strength)"
+    >>> unknown("strengthh", ["mean", "strength"])
+    "unknown 'strengthh'; did you mean 'strength'? (valid: mean, strength)"
     >>> unknown("q" * 60, ["mean"]).count("q"), unknown("q" * 61, ["mean"]).count("q")
     (60, 57)
     >>> unknown("q" * 61, ["mean"])[-21:]
@@ -122,7 +122,7 @@ def nearest(given: str, valid: Sequence[str]) -> str:
 
     >>> nearest("abcdefgxyz", ["mean", "abcdefghij"]), nearest("abcdefwxyz", ["abcdefghij"])
     ('abcdefghij', '')
-    >>> nearest("STRENGHT", ["Mean", "Strength"]), nearest("nx", ["mean", "Nx", "nX"])
+    >>> nearest("STRENGTHH", ["Mean", "Strength"]), nearest("nx", ["mean", "Nx", "nX"])
     ('Strength', 'Nx')
 
     A single word of a longer name is recognised, and symbols:

@@ -480,11 +480,11 @@ def named(error: pydantic.ValidationError, valid: Sequence[str]) -> pydantic.Val
     ... class Line:
     ...     length: Positive
     ...     nodes: Count
-    >>> Line(lenght=2)
+    >>> Line(lenqth=2)
     Traceback (most recent call last):
         ...
     stiction.base.errors.InputError: Line.nodes: missing
-    Line: unknown 'lenght'; did you mean 'length'? (valid: length, nodes)
+    Line: unknown 'lenqth'; did you mean 'length'? (valid: length, nodes)
     """
     mistakes: list[Any] = error.errors(include_url=False)
     misspelt = set()

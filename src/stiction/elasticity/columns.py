@@ -390,7 +390,7 @@ def block(
     >>> motions = np.array([np.r_[along, along], np.r_[into, into], np.r_[turn, turn - along]])
     >>> free.shape, np.allclose(free, free.T), np.allclose(free[:14, :14] @ motions.T, 0.0)
     ((15, 15), True, True)
-    >>> (motions @ free[:14, 14]).round(9).tolist()  # the moment is the height 0.375
+    >>> ((motions @ free[:14, 14]).round(9) + 0.0).tolist()  # the moment is the height 0.375
     [-1.0, 0.0, 0.375]
 
     A longer body is stiffer, and a body with a fixed bottom does not move freely.

@@ -885,8 +885,8 @@ def _peak(force: Array, top: int, noise: float, threshold: float) -> tuple[float
     >>> force = np.r_[-1, 5, -1, 9.0 - 0.25 * np.arange(-6, 7) ** 2, -1, 5]
     >>> force[9] += 0.5
     >>> peak, error = _peak(force, 9, 0.3, 9.5)
-    >>> f"{peak - 9.0 - 0.5 * 25 / 143:.6f} {error - 0.3 * math.sqrt(25 / 143):.6f}"
-    '0.000000 0.000000'
+    >>> f"{peak - 8.0 - 0.5 * 25 / 143:.6f} {error + 1.0 - 0.3 * math.sqrt(25 / 143):.6f}"
+    '1.000000 1.000000'
     >>> _peak(force[3:16], 6, 0.3, 9.5) == (peak, error)
     True
     >>> _peak(force[3:15], 6, 0.3, 9.5)[0] < 9.2

@@ -514,19 +514,19 @@ def given_twice(problem: Any, names: Collection[str], owner: str) -> list[str]:
     ...     friction = SimpleNamespace(**law, scale=scale)
     ...     problem = SimpleNamespace(friction=friction, load=load, given_pressure=pressure)
     ...     problem.specimen = specimen and SimpleNamespace(pressing=specimen)
-    ...     return [text[:47] for text in given_twice(problem, names, "profiles")]
+    ...     return [text[:47].rsplit(" ", 1)[0] for text in given_twice(problem, names, "profiles")]
     >>> messages("strength", "residual_strength"), messages("initial_stress")
-    ([], ['problem.load.initial_stress: has no effect toge'])
+    ([], ['problem.load.initial_stress: has no effect'])
     >>> messages("normal_pressure", "strength")
-    ['problem.load.pressing_force: has no effect toge']
+    ['problem.load.pressing_force: has no effect']
     >>> messages("strength", scale=None), messages("fracture_energy", scale=None)
-    (['problem.friction: give one of weakening_rate, c'], [])
+    (['problem.friction: give one of weakening_rate,'], [])
     >>> messages("friction_coefficient"), messages("friction_coefficient", pressure=3.0)
-    (['friction_coefficient: needs a normal pressure. '], [])
+    (['friction_coefficient: needs a normal pressure.'], [])
     >>> messages(specimen="soft"), messages(specimen="glued", pressure=3.0)
     ([], [])
     >>> messages(specimen="glued")
-    ["problem.specimen.pressing: 'glued' has no effec"]
+    ["problem.specimen.pressing: 'glued' has no"]
     """
     twice = [
         f"problem.{key}: has no effect together with {owner}.{name}. Leave either out"

@@ -403,8 +403,8 @@ def _pairs(value: Any) -> Any:
 
     >>> _pairs({("residual_strength", "strength"): 0.5, "critical_slip": {"strength": 0.25}})
     {'strength': {'residual_strength': 0.5, 'critical_slip': 0.25}}
-    >>> _pairs({("stength", "strength"): 0.5, "initial_stress": {"a": 1, "strength": 2}})
-    {'strength': {'stength': 0.5, 'initial_stress': 2}, 'initial_stress': {'a': 1}}
+    >>> _pairs({("strengthh", "strength"): 0.5, "initial_stress": {"a": 1, "strength": 2}})
+    {'strength': {'strengthh': 0.5, 'initial_stress': 2}, 'initial_stress': {'a': 1}}
     >>> _pairs(3.0)
     3.0
     >>> _pairs({"strength": 0.5})

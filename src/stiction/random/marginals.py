@@ -552,10 +552,10 @@ def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) 
     (('a', -2.0), ('b', 3.0), ('loc', 7.0), ('scale', 0.5))
     >>> _of_scipy("norm", {}, (7.0, 0.5)).parameters
     (('loc', 7.0), ('scale', 0.5))
-    >>> _of_scipy("beta", {"a": 2.0, "sacle": 3.0})  # doctest: +ELLIPSIS
+    >>> _of_scipy("beta", {"a": 2.0, "scal": 3.0})  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    stiction.base.errors.InputError: beta: unknown 'sacle'; did you mean 'scale'? (valid: ...)
+    stiction.base.errors.InputError: beta: unknown 'scal'; did you mean 'scale'? (valid: ...)
     beta.b: missing
     """
     family = getattr(scipy.stats, name, None)

@@ -294,10 +294,10 @@ def _check_line(number: int, line: str, separator: str) -> None:
     ...     try:
     ...         _check_line(3, line, separator)
     ...     except InputError as error:
-    ...         print(str(error)[:56])
-    line 3 has 2001 columns, more than 2000. Write each valu
-    line 3 has a cell of 1001 characters, more than 1000
-    line 3 has a cell of 1001 characters, more than 1000
+    ...         print(str(error)[:40])
+    line 3 has 2001 columns, more than 2000.
+    line 3 has a cell of 1001 characters, mo
+    line 3 has a cell of 1001 characters, mo
     """
     cells = line.rstrip(separator).split(None if separator == " " else separator or "\n")
     if len(cells) > MAX_COLUMNS:

@@ -343,8 +343,8 @@ def _of_dataset(
     >>> data = xr.Dataset({"tau": ("n", [3, 4.5]), "pos": ("n", [5, 0]), "t": ("n", [1, 2])})
     >>> data = data.assign(lateral=("m", [7]), tau=data.tau.assign_attrs(units="kPa"))
     >>> array, read = _of_dataset(data, "strength", ("x",), None, None)
-    >>> array.name, [*array.coords], str(read)[:39]
-    ('tau', ['pos', 't'], ": variable 'tau' in kPa, 2 values; othe")
+    >>> array.name, [*array.coords], str(read)[:33]
+    ('tau', ['pos', 't'], ": variable 'tau' in kPa, 2 values")
     >>> read.others
     ("'pos' (x)", "'t' (time, not read)", "'lateral' (travel, not read)")
     >>> array, read = _of_dataset(data, "strength", ("x",), "t", "pos")

@@ -524,17 +524,17 @@ def _decimal_mark(
     ...     try:
     ...         return _decimal_mark([cells, "?"], [0], rows, separator, stated)
     ...     except InputError as error:
-    ...         return str(error)[:37]
+    ...         return str(error)[:18]
     >>> mark("1", "2e3"), mark("1.020", "1.5"), mark("-1,020", "0,020"), mark("1.020")
     (None, '.', ',', '.')
     >>> mark("1.020", separator=";"), mark("1.02", separator=";"), mark("1,020,000")
-    ("line 3 has '1.020', which may have th", '.', "line 3 has '1,020,000', which may hav")
+    ("line 3 has '1.020'", '.', "line 3 has '1,020,")
     >>> mark("1.020", separator=chr(9)), mark("1,020", separator=",", stated=",")
-    ("line 3 has '1.020', which may have th", ',')
+    ("line 3 has '1.020'", ',')
     >>> mark("980", "1.020"), mark("x,5", "1,020.5")
-    ("line 4 has '1.020', which may have th", "line 4 has '1,020.5', and line 4 has ")
+    ("line 4 has '1.020'", "line 4 has '1,020.")
     >>> mark("1.020", stated=","), mark("1,020.5", stated="."), mark("980", "1.02", stated=",")
-    (',', '.', "line 4 has '1.02', in which '.' does ")
+    (',', '.', "line 4 has '1.02',")
     """
     # A cell such as 0.5 or 1.02 shows that its mark separates decimals.
     example: dict[str, str] = {}  # by mark: a cell that contains it, with its line
