@@ -48,13 +48,16 @@ def read_netcdf(content: bytes, unwanted: Collection[str] = ()) -> xr.Dataset:
 
     Examples
     --------
+    >>> import pathlib, tempfile
     >>> import xarray as xr
     >>> data = {"load": ("x", [3.0, 7.0]), "name": "first", "labels": ("x", ["a", "b"])}
     >>> given = xr.Dataset(data, attrs={"title": "press"})
-    >>> read = read_netcdf(bytes(given.to_netcdf(engine="h5netcdf")))
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "press.nc")
+    >>> given.to_netcdf(path, engine="h5netcdf")
+    >>> read = read_netcdf(path.read_bytes())
     >>> sorted(read.data_vars), read["load"].values.tolist(), read.attrs
     (['labels', 'load'], [3.0, 7.0], {'title': 'press'})
-    >>> sorted(read_netcdf(bytes(given.to_netcdf(engine="h5netcdf")), ["load"]).data_vars)
+    >>> sorted(read_netcdf(path.read_bytes(), ["load"]).data_vars)
     ['labels']
     >>> classic = bytes(given[["load"]].to_netcdf(engine="scipy", format="NETCDF3_CLASSIC"))
     >>> classic[:3], read_netcdf(classic)["load"].values.tolist()

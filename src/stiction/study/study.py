@@ -479,7 +479,7 @@ class Study(_Parts):
         >>> Study(**given, method=st.LocalCriterion(), sweep=sweep)  # doctest: +ELLIPSIS
         Traceback (most recent call last):
             ...
-        stiction...: Study: ...: must be greater than 0, got -3.0, at point 2 (...) of the sweep
+        stiction...: Study: ...: must be greater than ... got -3.0, at point 2 (...) of the sweep
         """
         taken = {*variables_in(self.experiments), "sample", "x", "y"}
         fields = {} if self.profiles else self.experiments[0].random.properties
