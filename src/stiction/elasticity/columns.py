@@ -63,7 +63,7 @@ largest width over the length of these columns."""
 STRIDE, PERIOD = 1 << 20, 2 << 20
 """Distances between the labels of two lines and of two periods. Lines
 at edges are even, and lines of cells odd."""
-LOBATTO = np.concatenate(([-1.0], legendre.Legendre.basis(DEGREE).deriv().roots(), [1.0]))
+LOBATTO = np.concatenate(([-1.0], legendre.Legendre.basis(DEGREE).deriv().roots().real, [1.0]))
 """Points of an element on [-1, 1]."""
 PUSH = 1 << 60
 """Label of the force of the push, per unit depth. Rows and columns hold
