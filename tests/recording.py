@@ -34,11 +34,10 @@ NUMBER = r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)"
 NAME = r"'[^' ]*'|(?!scipy)\b[A-Za-z]\w*(?:[._]\w+)+|\b[GMk\u00b5mu]?(?:Pa|N|m)\b"
 SENSE = (
     r"|\b(?:above|at least|at most|before|below|beyond|after|earlier|fewer|finer|coarser|faster"
-)
-SENSE += (
     r"|slower|higher|lower|larger|smaller|later|less|more|longer|shorter|stronger|weaker|never"
+    r"|no|not|only|raise|reduce|with|without|\w+(?:est|normal|bull|ric)|II?I?)\b"
 )
-SENSE += r"|no|not|only|raise|reduce|with|without|\w+(?:est|normal|bull|ric)|II?I?)\b"
+"""Words without which a message would say the opposite, or name another family or mode."""
 OF_OTHERS = r"\S+ GiB|numba cannot compile it: .*"
 """Parts of messages that belong to the machine or to another package."""
 

@@ -122,12 +122,15 @@ def test_each_parameter_counts_or_is_refused_by_its_name(call, name):
         assert numbers(result) != numbers(example(call)), f"{name} has no effect"
 
 
+LATER = evaluated("parameters that are looked at after others", globals())
+
+
 @pytest.mark.parametrize("call", [c for c in CALLABLE if not c.startswith("extensions.")])
 def test_objects_of_no_kind_are_refused_by_the_names_of_their_parameters(call):
     names = [*inspect.signature(call_of(call)).parameters]
     _, refusal = attempt(lambda: call_of(call)(**dict.fromkeys(names, object())))
     unnamed = [name for name in names if not re.search(rf"\b{name}: ", refusal)]
-    assert unnamed == evaluated("parameters that are looked at after others", {}).get(call, [])
+    assert unnamed == LATER.get(call, [])
 
 
 @pytest.mark.parametrize("call", BASE)

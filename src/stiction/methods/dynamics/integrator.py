@@ -122,14 +122,8 @@ class Run:
 
         >>> from types import SimpleNamespace
         >>> from stiction.problem.friction.parameters import Linear
-        >>> fields = {
-        ...     "peak": [5.0, 7.0],
-        ...     "residual": [1.0, 2.0],
-        ...     "weakening_rate": [2.0, 3.0],
-        ... }
-        >>> nodes = SimpleNamespace(
-        ...     **{name: np.array(values) for name, values in fields.items()}
-        ... )
+        >>> peak, residual, rate = np.array([[5.0, 7.0], [1.0, 2.0], [2.0, 3.0]])
+        >>> nodes = SimpleNamespace(peak=peak, residual=residual, weakening_rate=rate)
         >>> run = Run(
         ...     None, SimpleNamespace(nodes=nodes, law=Linear()), "sliding", 1.0, 0.0
         ... )

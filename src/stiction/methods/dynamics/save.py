@@ -640,9 +640,10 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
     """
     import xarray as xr
 
-    place, dropped = Path(folder), FIELDS.keys() - {*(FIELDS if fields is None else fields)}
-    _check_fields(fields or ())
-    parts = [_read(path, dropped) for path in sorted(place.glob(_FRAME_FILES))]
+    place, wanted = Path(folder), FIELDS if fields is None else fields
+    _check_fields(wanted)
+    unwanted = FIELDS.keys() - {*wanted}
+    parts = [_read(path, unwanted) for path in sorted(place.glob(_FRAME_FILES))]
     if not parts:
         raise InputError(f"folder: {str(folder)!r} holds no frames of a rupture")
 

@@ -326,14 +326,8 @@ def node_strength(setting: Setting, i: int, slip: float) -> Any:
 
     >>> from types import SimpleNamespace
     >>> from stiction.problem.friction.parameters import Linear
-    >>> fields = {
-    ...     "peak": [5.0, 7.0],
-    ...     "residual": [1.0, 2.0],
-    ...     "weakening_rate": [2.0, 3.0],
-    ... }
-    >>> nodes = SimpleNamespace(
-    ...     **{name: np.array(values) for name, values in fields.items()}
-    ... )
+    >>> peak, residual, rate = np.array([[5.0, 7.0], [1.0, 2.0], [2.0, 3.0]])
+    >>> nodes = SimpleNamespace(peak=peak, residual=residual, weakening_rate=rate)
     >>> setting = SimpleNamespace(law=Linear(), nodes=nodes)
     >>> [node_strength.py_func(setting, i, 1.5) for i in (0, 1)]
     [2.0, 2.5]
@@ -348,14 +342,8 @@ def node_line(setting: Setting, i: int, slip: float, ahead: float) -> Any:
 
     >>> from types import SimpleNamespace
     >>> from stiction.problem.friction.parameters import Linear
-    >>> fields = {
-    ...     "peak": [5.0, 7.0],
-    ...     "residual": [1.0, 2.0],
-    ...     "weakening_rate": [2.0, 3.0],
-    ... }
-    >>> nodes = SimpleNamespace(
-    ...     **{name: np.array(values) for name, values in fields.items()}
-    ... )
+    >>> peak, residual, rate = np.array([[5.0, 7.0], [1.0, 2.0], [2.0, 3.0]])
+    >>> nodes = SimpleNamespace(peak=peak, residual=residual, weakening_rate=rate)
     >>> setting = SimpleNamespace(law=Linear(), nodes=nodes)
     >>> [node_line.py_func(setting, 1, 1.5, ahead) for ahead in (0.1, 0.5)]
     [(2.5, 3.0), (2.0, 0.0)]
