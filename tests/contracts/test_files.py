@@ -146,9 +146,8 @@ def test_a_film_has_the_frames_of_its_run(name, tmp_path):
     from PIL import Image
 
     run, _ = rupture(name)
-    slow = run.assign(
-        top_slip_rate=1e-9 * run.top_slip_rate
-    )  # slow, but in the same proportions
+    # All rates are slow, in the same proportions.
+    slow = run.assign(top_slip_rate=1e-9 * run.top_slip_rate)
     path = st.plot.film(slow, tmp_path / "film.gif", frames=7, **QUIET)
     with Image.open(path) as film:
         assert film.n_frames == min(7, run.sizes["time"])
